@@ -1,0 +1,6 @@
+#![cfg_attr(not(feature = "sim"), no_std)]
+//! isodp: a deterministic, telegram-accurate simulator of isochronous PROFIBUS DP (DP-V2) networks.
+
+extern crate alloc;
+
+pub mod time;

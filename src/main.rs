@@ -1,0 +1,3 @@
+//! The command line `isodp`.
+
+fn main() {}
