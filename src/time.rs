@@ -330,7 +330,16 @@ mod tests {
     fn every_bit_is_a_whole_number_of_ticks() {
         // bit/s of wire.md 2.1 as fractions over 11, so that 500/11 kbit/s is whole.
         let times_11 = [
-            105_600, 211_200, 343_750, 500_000, 1_031_250, 2_062_500, 5_500_000, 16_500_000, 33_000_000, 66_000_000,
+            105_600,
+            211_200,
+            343_750,
+            500_000,
+            1_031_250,
+            2_062_500,
+            5_500_000,
+            16_500_000,
+            33_000_000,
+            66_000_000,
             132_000_000i64,
         ];
         for (rate, bps_11) in BitRate::ALL.iter().zip(times_11) {
