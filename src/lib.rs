@@ -3,5 +3,9 @@
 
 extern crate alloc;
 
+pub mod fdl;
+pub mod observation;
+#[cfg(feature = "sim")]
+pub mod study;
 pub mod time;
 pub mod wire;
