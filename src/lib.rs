@@ -3,6 +3,7 @@
 
 extern crate alloc;
 
+pub mod device;
 pub mod fdl;
 pub mod observation;
 #[cfg(feature = "sim")]
