@@ -6,7 +6,7 @@
 //!
 //! | state | `start` | `synch` | `window_closed` | `stop` |
 //! |---|---|---|---|---|
-//! | Idle | Waiting (2.1.2) | Idle, ignored | nothing | Idle |
+//! | Idle | Waiting (2.1.2) | nothing | nothing | Idle |
 //! | Waiting | Waiting | first: E = a + `T_DP`, P = `T_DP`; Narrowing (D11) | nothing | Idle |
 //! | Narrowing | same | hit: same; the run of hits full: window halved, at the final width Settling (D12) | failure | Idle |
 //! | Settling | same | hit: same; the run of hits full: Locked (D12) | failure | Idle |
@@ -24,6 +24,7 @@
 //! frequency offset swings the error to 2.6 times its per-cycle value about six cycles after the first SYNCH; halving
 //! regardless would throw such a clock out in every attempt, for ever.
 
+use crate::observation::{ClockVerdict, PllState};
 use crate::time::{Local, Span};
 
 /// Fraction bits of the loop's own arithmetic: E, P and the gains are counted in 1/65 536, so that the integral gain
@@ -135,6 +136,10 @@ impl Fine {
     fn times(self, gain: u32) -> Self {
         Self((self.0 * i128::from(gain)) >> FRACTION_BITS)
     }
+    /// Whether this error lies in a window of half width `window`, its borders included.
+    fn within(self, window: Span) -> bool {
+        self.0.abs() <= Self::of(window).0
+    }
     /// The nearest whole tick.
     fn round(self) -> i64 {
         ((self.0 + ONE / 2) >> FRACTION_BITS) as i64
@@ -183,53 +188,12 @@ impl Track {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Inner {
+enum State {
     Idle,
     Waiting,
     Narrowing { track: Track, hits: u8, failures: u8 },
     Settling { track: Track, hits: u8, failures: u8 },
     Locked { track: Track, failures: u16 },
-}
-
-/// States of the clock recovery, without their data.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub enum State {
-    /// Not started: no Operate or no valid `Data_Exchange` yet (manual 2.1.2).
-    Idle,
-    /// Started, waits for the first SYNCH.
-    Waiting,
-    /// Follows the clock; the window is wider than the final one.
-    Narrowing,
-    /// Follows the clock at the final width, not yet often enough.
-    Settling,
-    /// Follows the clock and monitors it.
-    Locked,
-}
-
-/// What one SYNCH, or its absence, was to the loop. Errors are arrival minus prediction, rounded to a tick.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub enum Verdict {
-    /// The loop is not started.
-    Ignored,
-    /// First SYNCH: the loop begins with it.
-    First,
-    /// Within the window.
-    Hit {
-        /// Arrival minus prediction.
-        error: Span,
-    },
-    /// Outside the window: a clock failure.
-    Outside {
-        /// Arrival minus prediction.
-        error: Span,
-    },
-    /// No SYNCH until the window closed: a clock failure.
-    Missing,
-    /// Belongs to a cycle already judged; not counted.
-    Stray {
-        /// Arrival minus the prediction of the coming SYNCH.
-        error: Span,
-    },
 }
 
 /// What a verdict changed beyond the loop's own numbers.
@@ -248,8 +212,10 @@ pub enum Change {
 /// Answer to one SYNCH or one closed window.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Judgement {
-    /// What it was.
-    pub verdict: Verdict,
+    /// What it was. `Stray` counts nowhere.
+    pub verdict: ClockVerdict,
+    /// Arrival minus prediction, rounded to a tick; zero for `First` and `Missing`.
+    pub error: Span,
     /// What it changed.
     pub change: Change,
 }
@@ -258,7 +224,7 @@ pub struct Judgement {
 #[derive(Clone, Debug)]
 pub struct Pll {
     settings: PllSettings,
-    inner: Inner,
+    state: State,
 }
 
 impl Pll {
@@ -270,44 +236,42 @@ impl Pll {
         assert!(settings.t_dp > Span::ZERO, "T_DP must be positive");
         assert!(settings.quantum > Span::ZERO, "the timer quantum must be positive");
         assert!(settings.kp.max(settings.ki) <= 1 << FRACTION_BITS, "a gain above one does not settle");
-        Self { settings, inner: Inner::Idle }
+        Self { settings, state: State::Idle }
     }
 
     /// Starts to look for the clock: the slave sees Operate and valid `Data_Exchange` (manual 2.1.2).
     /// Without effect once started.
     pub fn start(&mut self) {
-        if self.inner == Inner::Idle {
-            self.inner = Inner::Waiting;
+        if self.state == State::Idle {
+            self.state = State::Waiting;
         }
     }
 
     /// Forgets the clock: the slave left data exchange.
     pub fn stop(&mut self) {
-        self.inner = Inner::Idle;
+        self.state = State::Idle;
     }
 
-    /// The last bit of a SYNCH arrived. Ask [`Pll::window_end`] again afterwards.
-    pub fn synch(&mut self, arrival: Local) -> Judgement {
+    /// The last bit of a SYNCH arrived. `None` while not started. Ask [`Pll::window_end`] again afterwards.
+    pub fn synch(&mut self, arrival: Local) -> Option<Judgement> {
         let arrival = self.settings.captured(arrival);
-        let track = match self.inner {
-            Inner::Idle => return Judgement { verdict: Verdict::Ignored, change: Change::None },
-            Inner::Waiting => {
+        let track = match self.state {
+            State::Idle => return None,
+            State::Waiting => {
                 let first = self.following(Track::first(arrival, &self.settings), 0, 0);
-                return self.enter(first, Verdict::First);
+                return Some(self.enter(first, ClockVerdict::First, Fine(0)));
             }
-            Inner::Narrowing { track, .. } | Inner::Settling { track, .. } | Inner::Locked { track, .. } => track,
+            State::Narrowing { track, .. } | State::Settling { track, .. } | State::Locked { track, .. } => track,
         };
-        let fine = track.error(arrival);
-        let error = Span::from_ticks(fine.round());
-        if fine.0 < -track.period.half().0 {
-            Judgement { verdict: Verdict::Stray { error }, change: Change::None }
-        } else if fine.0.abs() <= Fine::of(track.window).0 {
-            let next = self.after_hit(fine);
-            self.enter(next, Verdict::Hit { error })
+        let error = track.error(arrival);
+        let (verdict, next) = if error.0 < -track.period.half().0 {
+            (ClockVerdict::Stray, self.state)
+        } else if error.within(track.window) {
+            (ClockVerdict::Hit, self.after_hit(error))
         } else {
-            let next = self.after_failure();
-            self.enter(next, Verdict::Outside { error })
-        }
+            (ClockVerdict::Outside, self.after_failure())
+        };
+        Some(self.enter(next, verdict, error))
     }
 
     /// The deadline [`Pll::window_end`] came due at `now`. A call before the deadline in force is stale and answered
@@ -317,7 +281,7 @@ impl Pll {
             return None;
         }
         let next = self.after_failure();
-        Some(self.enter(next, Verdict::Missing))
+        Some(self.enter(next, ClockVerdict::Missing, Fine(0)))
     }
 
     /// When [`Pll::window_closed`] is due: the first point of the timer grid at which no SYNCH can be a hit any more.
@@ -343,7 +307,7 @@ impl Pll {
 
     /// Whether the loop follows the clock and monitors it.
     pub fn is_locked(&self) -> bool {
-        matches!(self.inner, Inner::Locked { .. })
+        matches!(self.state, State::Locked { .. })
     }
 
     /// Recovered period P, rounded to a tick; `T_DP` as parameterised without prediction.
@@ -358,20 +322,20 @@ impl Pll {
 
     /// Failure counter of the clock monitoring, +10 per failure, −1 per hit, 0..=10·tolerance; 0 unless locked.
     pub fn failures(&self) -> u16 {
-        match self.inner {
-            Inner::Locked { failures, .. } => failures,
+        match self.state {
+            State::Locked { failures, .. } => failures,
             _ => 0,
         }
     }
 
     /// State, without its data.
-    pub fn state(&self) -> State {
-        match self.inner {
-            Inner::Idle => State::Idle,
-            Inner::Waiting => State::Waiting,
-            Inner::Narrowing { .. } => State::Narrowing,
-            Inner::Settling { .. } => State::Settling,
-            Inner::Locked { .. } => State::Locked,
+    pub fn state(&self) -> PllState {
+        match self.state {
+            State::Idle => PllState::Idle,
+            State::Waiting => PllState::Waiting,
+            State::Narrowing { .. } => PllState::Narrowing,
+            State::Settling { .. } => PllState::Settling,
+            State::Locked { .. } => PllState::Locked,
         }
     }
 
@@ -381,9 +345,9 @@ impl Pll {
     }
 
     fn track(&self) -> Option<&Track> {
-        match &self.inner {
-            Inner::Idle | Inner::Waiting => None,
-            Inner::Narrowing { track, .. } | Inner::Settling { track, .. } | Inner::Locked { track, .. } => Some(track),
+        match &self.state {
+            State::Idle | State::Waiting => None,
+            State::Narrowing { track, .. } | State::Settling { track, .. } | State::Locked { track, .. } => Some(track),
         }
     }
 
@@ -394,74 +358,73 @@ impl Pll {
     }
 
     /// Narrowing or Settling, as the width of the window says.
-    fn following(&self, track: Track, hits: u8, failures: u8) -> Inner {
+    fn following(&self, track: Track, hits: u8, failures: u8) -> State {
         if track.window > self.settings.final_window() {
-            Inner::Narrowing { track, hits, failures }
+            State::Narrowing { track, hits, failures }
         } else {
-            Inner::Settling { track, hits, failures }
+            State::Settling { track, hits, failures }
         }
     }
 
-    fn after_hit(&self, error: Fine) -> Inner {
+    fn after_hit(&self, error: Fine) -> State {
         let settings = &self.settings;
-        match self.inner {
-            Inner::Narrowing { track, hits, .. } => {
+        match self.state {
+            State::Narrowing { track, hits, .. } => {
                 let narrower = settings.narrowed(track.window);
-                let fits = error.0.abs() <= Fine::of(narrower).0;
-                let hits = if fits { hits + 1 } else { 0 };
+                let hits = if error.within(narrower) { hits + 1 } else { 0 };
                 let track = track.corrected(error, settings);
                 if hits > 0 && hits >= settings.hits_per_step {
                     self.following(Track { window: narrower, ..track }, 0, 0)
                 } else {
-                    Inner::Narrowing { track, hits, failures: 0 }
+                    State::Narrowing { track, hits, failures: 0 }
                 }
             }
-            Inner::Settling { track, hits, .. } => {
+            State::Settling { track, hits, .. } => {
                 let track = track.corrected(error, settings);
                 if hits + 1 >= settings.hits_to_lock {
-                    Inner::Locked { track, failures: 0 }
+                    State::Locked { track, failures: 0 }
                 } else {
-                    Inner::Settling { track, hits: hits + 1, failures: 0 }
+                    State::Settling { track, hits: hits + 1, failures: 0 }
                 }
             }
-            Inner::Locked { track, failures } => {
-                Inner::Locked { track: track.corrected(error, settings), failures: failures.saturating_sub(1) }
+            State::Locked { track, failures } => {
+                State::Locked { track: track.corrected(error, settings), failures: failures.saturating_sub(1) }
             }
-            inner @ (Inner::Idle | Inner::Waiting) => inner,
+            state @ (State::Idle | State::Waiting) => state,
         }
     }
 
-    fn after_failure(&self) -> Inner {
-        match self.inner {
-            Inner::Narrowing { track, failures, .. } | Inner::Settling { track, failures, .. } => {
+    fn after_failure(&self) -> State {
+        match self.state {
+            State::Narrowing { track, failures, .. } | State::Settling { track, failures, .. } => {
                 if failures + 1 >= self.settings.failures_to_restart {
-                    Inner::Waiting
+                    State::Waiting
                 } else {
                     self.following(track.flywheel(), 0, failures + 1)
                 }
             }
-            Inner::Locked { track, failures } => {
+            State::Locked { track, failures } => {
                 let failures = failures + FAILURE_WEIGHT;
                 if failures > FAILURE_WEIGHT * u16::from(self.settings.tolerance) {
-                    Inner::Waiting
+                    State::Waiting
                 } else {
-                    Inner::Locked { track: track.flywheel(), failures }
+                    State::Locked { track: track.flywheel(), failures }
                 }
             }
-            inner @ (Inner::Idle | Inner::Waiting) => inner,
+            state @ (State::Idle | State::Waiting) => state,
         }
     }
 
     /// Stores a state and names what that changed.
-    fn enter(&mut self, next: Inner, verdict: Verdict) -> Judgement {
+    fn enter(&mut self, next: State, verdict: ClockVerdict, error: Fine) -> Judgement {
         let before = self.state();
-        self.inner = next;
+        self.state = next;
         let change = match (before, self.state()) {
-            (State::Narrowing | State::Settling, State::Locked) => Change::Locked,
-            (State::Locked, State::Waiting) => Change::Lost,
-            (State::Narrowing | State::Settling, State::Waiting) => Change::Restarted,
+            (PllState::Narrowing | PllState::Settling, PllState::Locked) => Change::Locked,
+            (PllState::Locked, PllState::Waiting) => Change::Lost,
+            (PllState::Narrowing | PllState::Settling, PllState::Waiting) => Change::Restarted,
             _ => Change::None,
         };
-        Judgement { verdict, change }
+        Judgement { verdict, error: Span::from_ticks(error.round()), change }
     }
 }

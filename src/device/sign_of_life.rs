@@ -17,6 +17,8 @@
 //! In operation the expectation runs freely: after an error it goes on from the value that was expected, and the received
 //! one is forgotten. 0 is a wrong value like any other.
 
+use crate::observation::LifeState;
+
 /// A sign of life: 1..=15 in turn, 0 = invalid or not running (manual 2.2; bits 12-15 of STW2 and ZSW2).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Debug)]
 pub struct LifeSign(u8);
@@ -107,26 +109,6 @@ enum State {
     Operating { expected: Expectation },
 }
 
-/// Phases of the sign of life, numbered as the start-up of the encoder (manual 2.1.3 to 2.1.5).
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub enum Phase {
-    /// Phase 3, waits for a start value.
-    Waiting,
-    /// Phase 3, synchronises without tolerance.
-    Strict,
-    /// Phase 4, the own sign of life runs, still without tolerance.
-    Confirming,
-    /// Phase 5, monitors with tolerance.
-    Operating,
-}
-
-impl Phase {
-    /// Whether the own sign of life runs in this phase (manual 2.1.4: after phase 3).
-    pub const fn is_synchronised(self) -> bool {
-        matches!(self, Self::Confirming | Self::Operating)
-    }
-}
-
 /// What a received value was.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Verdict {
@@ -148,8 +130,8 @@ pub enum Verdict {
 pub struct Step {
     /// What the value was.
     pub verdict: Verdict,
-    /// The phase entered with this value, if it changed.
-    pub entered: Option<Phase>,
+    /// The state entered with this value, if it is another one.
+    pub entered: Option<LifeState>,
     /// More failures than tolerated in operation: fault 0F02 (manual 5.3).
     pub tripped: bool,
 }
@@ -191,14 +173,19 @@ impl Monitor {
         }
     }
 
-    /// Phase in force.
-    pub fn phase(&self) -> Phase {
+    /// State, without its data.
+    pub fn state(&self) -> LifeState {
         match self.state {
-            State::Waiting { .. } => Phase::Waiting,
-            State::Strict { .. } => Phase::Strict,
-            State::Confirming { .. } => Phase::Confirming,
-            State::Operating { .. } => Phase::Operating,
+            State::Waiting { .. } => LifeState::Waiting,
+            State::Strict { .. } => LifeState::Strict,
+            State::Confirming { .. } => LifeState::Confirming,
+            State::Operating { .. } => LifeState::Operating,
         }
+    }
+
+    /// Whether the own sign of life runs: phase 3 is complete (manual 2.1.4).
+    pub fn is_synchronised(&self) -> bool {
+        matches!(self.state, State::Confirming { .. } | State::Operating { .. })
     }
 
     /// Failure counter, +10 per wrong value, −1 per right one. After a trip it keeps its value until the next start value.
@@ -266,12 +253,12 @@ impl Monitor {
         self.enter(State::Waiting { last: Some(received) }, Verdict::Wrong { expected: expected.sign })
     }
 
-    /// Stores a state and names the phase if it changed.
+    /// Stores a state and names it if it is another one.
     fn enter(&mut self, next: State, verdict: Verdict) -> Step {
-        let before = self.phase();
+        let before = self.state();
         self.state = next;
-        let phase = self.phase();
-        Step { verdict, entered: (phase != before).then_some(phase), tripped: false }
+        let now = self.state();
+        Step { verdict, entered: (now != before).then_some(now), tripped: false }
     }
 }
 
@@ -288,7 +275,7 @@ impl Counter {
     }
     /// The sign to send in this cycle; once per `T_DP` at the slave, once per `T_MAPC` at the master.
     ///
-    /// `running` is [`Phase::is_synchronised`] of the monitor after its cycle: the first running cycle sends 1 (Model:
+    /// `running` is [`Monitor::is_synchronised`] after the monitor's cycle: the first running cycle sends 1 (Model:
     /// D16), the cycle in which the monitor trips sends 0 (manual 2.1.3).
     pub fn cycle(&mut self, running: bool) -> LifeSign {
         self.sign = if running { self.sign.next() } else { LifeSign::INVALID };
