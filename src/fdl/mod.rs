@@ -38,7 +38,12 @@ pub enum Input<'a, C> {
     /// The last bit of the telegram that asked for it ([`Outbox::send_clock`]) has left this station.
     Sent,
     /// An armed deadline came due.
-    Deadline(Timer),
+    Deadline {
+        /// Which one.
+        timer: Timer,
+        /// Whether this station's receiver sees characters on the line at this instant.
+        busy: bool,
+    },
     /// The instant of [`Outbox::sample_at`] came; the shaft was at this raw position [steps].
     Sample(u32),
     /// The scenario orders something.
@@ -177,6 +182,9 @@ impl Outbox {
     }
 
     /// Sends the telegram that `fill` writes, its first bit at `at`. One telegram per step.
+    ///
+    /// # Panics
+    /// When this step has sent one already.
     pub fn send(&mut self, at: Local, fill: impl FnOnce(&mut Frame)) {
         assert!(self.send.is_none(), "a step sends one telegram at most");
         fill(&mut self.frame);
