@@ -4,6 +4,7 @@
 extern crate alloc;
 
 pub mod device;
+pub mod dp;
 pub mod fdl;
 pub mod observation;
 #[cfg(feature = "sim")]

@@ -83,6 +83,14 @@ pub struct Identity {
     pub t_sdr: Tbit,
 }
 
+/// A request to execute.
+struct Arrived<'a> {
+    now: Local,
+    header: Header,
+    du: &'a [u8],
+    sample: u32,
+}
+
 /// A DP slave without its device.
 #[derive(Clone, Debug)]
 pub struct Slave {
@@ -147,7 +155,8 @@ impl Slave {
                 if self.master == Some(header.sa) {
                     self.retrigger(now, out);
                 }
-                self.request(now, &header, du, heard.sample, app, out);
+                let request = Arrived { now, header, du, sample: heard.sample };
+                self.request(&request, app, out);
             }
             Indication::Broadcast { header, du } => self.broadcast(now, &header, du, app, out),
             Indication::Published { publisher, du } => app.published(now, publisher, du, out),
@@ -159,17 +168,10 @@ impl Slave {
         }
     }
 
-    fn request(
-        &mut self,
-        now: Local,
-        header: &Header,
-        du: &[u8],
-        sample: u32,
-        app: &mut impl Application,
-        out: &mut Outbox,
-    ) {
+    fn request(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
+        let &Arrived { now, header, du, .. } = request;
         match (header.dsap, header.ssap) {
-            (None, None) => self.data_exchange(now, header.sa, du, sample, app, out),
+            (None, None) => self.data_exchange(request, app, out),
             (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, out),
             (Some(Sap::GET_CFG), Some(Sap::MASTER_MS0)) => {
                 let config = self.identity.config;
@@ -195,16 +197,9 @@ impl Slave {
         self.state != SlaveState::WaitPrm && self.master.is_some_and(|master| master != sa)
     }
 
-    fn data_exchange(
-        &mut self,
-        now: Local,
-        sa: Address,
-        du: &[u8],
-        sample: u32,
-        app: &mut impl Application,
-        out: &mut Outbox,
-    ) {
-        if self.state != SlaveState::DataExch || self.is_foreign(sa) {
+    fn data_exchange(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
+        let &Arrived { now, header, du, sample } = request;
+        if self.state != SlaveState::DataExch || self.is_foreign(header.sa) {
             return self.refuse(now, out);
         }
         let expected = usize::from(self.identity.outputs);

@@ -181,6 +181,9 @@ impl Active {
         end
     }
     /// Polls the next address of the GAP with FDL status, its first bit at `at`. Returns the address.
+    ///
+    /// # Panics
+    /// While another answer is awaited: a bug of the caller.
     pub fn poll_gap(&mut self, at: Local, out: &mut Outbox) -> Address {
         let to = self.next_gap();
         let header = Header::request(to, self.address, Service::FdlStatus, Fcb::Unused);
@@ -198,6 +201,9 @@ impl Active {
         }
     }
     /// Sends a request of `len` octets that `write` fills in, its first bit at `at`, and awaits the answer.
+    ///
+    /// # Panics
+    /// While another answer is awaited, or above 246 octets: bugs of the caller.
     pub fn request(
         &mut self,
         at: Local,
