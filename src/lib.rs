@@ -8,6 +8,8 @@ pub mod dp;
 pub mod fdl;
 pub mod observation;
 #[cfg(feature = "sim")]
+pub mod sim;
+#[cfg(feature = "sim")]
 pub mod study;
 pub mod time;
 pub mod wire;
