@@ -33,7 +33,7 @@ impl Angle {
     pub const fn units(self) -> i64 {
         self.0
     }
-    /// The angle [revolutions], for display and statistics.
+    /// The angle in revolutions, for display and statistics.
     pub fn as_revs(self) -> f64 {
         self.0 as f64 / Self::UNITS_PER_REV as f64
     }
@@ -303,7 +303,7 @@ impl Resolution {
     pub const fn revolutions(self) -> u32 {
         self.revolutions
     }
-    /// The raw position [steps]: `angle` in steps, rounded down, modulo all positions. Model: D21, the first stage.
+    /// The raw position: `angle` in steps, rounded down, modulo all positions. Model: D21, the first stage.
     pub const fn raw(self, angle: Angle) -> u32 {
         let revs = (angle.0 >> 32).rem_euclid(self.revolutions as i64) as u64;
         let within = (angle.0 as u32 as u64 * self.steps_per_rev as u64) >> 32;
