@@ -80,18 +80,41 @@ impl Filter {
     pub const fn all(own: Address) -> Self {
         Self { all: true, own, publishers: 0 }
     }
-    /// Whether a telegram with these octets passes. Looks at the octets as they are, disturbed or not.
+    /// Whether a telegram with this route passes; without a route only stations that hear everything get it.
     #[inline]
-    pub fn passes(&self, octets: &[u8]) -> bool {
-        // Destination and source sit at 1, 2 behind SD1, SD3 and SD4 and at 4, 5 behind SD2; bit 7 announces a SAP.
-        let (da, sa, fc) = match octets {
-            [0x68, _, _, _, da, sa, fc, ..] | [0x10 | 0xA2, da, sa, fc, ..] => (da & 0x7F, sa & 0x7F, *fc),
-            _ => return self.all,
-        };
-        let is_reply = fc & 0x40 == 0;
+    pub fn passes(&self, route: Option<Route>) -> bool {
         self.all
-            || da == self.own.get()
-            || (da == Address::BROADCAST.get() && (!is_reply || self.publishers >> sa & 1 == 1))
+            || route.is_some_and(|Route { da, sa, reply }| {
+                da == self.own.get() || (da == Route::TO_ALL && (!reply || self.publishers >> sa & 1 == 1))
+            })
+    }
+}
+
+/// The octets of a telegram that decide who takes it, as they are, disturbed or not.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Route {
+    /// Destination, 0..=127.
+    pub da: u8,
+    /// Source, 0..=127.
+    pub sa: u8,
+    /// Sent without the token: FC bit 6 is 0.
+    pub reply: bool,
+}
+
+impl Route {
+    /// Destination of broadcasts.
+    pub const TO_ALL: u8 = Address::BROADCAST.get();
+
+    /// Reads the route. None for SC, the token and what does not begin as a telegram: only active stations care.
+    #[inline]
+    pub fn of(octets: &[u8]) -> Option<Self> {
+        // Destination, source and FC sit at 1 behind SD1 and SD3 and at 4 behind SD2; bit 7 announces a SAP.
+        match *octets {
+            [0x68, _, _, _, da, sa, fc, ..] | [0x10 | 0xA2, da, sa, fc, ..] => {
+                Some(Self { da: da & 0x7F, sa: sa & 0x7F, reply: fc & 0x40 == 0 })
+            }
+            _ => None,
+        }
     }
 }
 
@@ -156,8 +179,8 @@ impl Default for Outbox {
 }
 
 impl Outbox {
-    /// Observations that one step may make. A step that needs more is a bug.
-    pub const MAX_OBSERVATIONS: usize = 16;
+    /// Observations that one step may make: a few for each of 126 stations. A step that needs more is a bug.
+    pub const MAX_OBSERVATIONS: usize = 160;
 
     /// An empty outbox.
     pub const fn new() -> Self {

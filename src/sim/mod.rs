@@ -3,7 +3,11 @@
 //! Only this layer and those above it know true time. Everything here is decided by integers, draws from streams that
 //! have a name, and computes transcendental functions in Rust, so a run is the same on every machine.
 
+pub mod bus;
 pub mod crystal;
+pub mod fault;
 pub mod motion;
 pub mod noise;
+pub mod network;
 pub mod queue;
+pub mod record;
