@@ -7,6 +7,8 @@ pub mod device;
 pub mod fdl;
 pub mod observation;
 #[cfg(feature = "sim")]
+pub mod sim;
+#[cfg(feature = "sim")]
 pub mod study;
 pub mod time;
 pub mod wire;
