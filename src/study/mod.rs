@@ -2,3 +2,4 @@
 //! threads and reports.
 
 pub mod row;
+pub mod scenario;

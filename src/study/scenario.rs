@@ -1,0 +1,391 @@
+//! Scenarios: one network, what moves and what goes wrong in it, and how long to watch.
+//!
+//! A scenario is a TOML file whose leading comment asks a question. Reading it takes three steps, each in a module of
+//! its own: the text becomes a tree of values that know their place, the tree becomes a [`Scenario`] key by key,
+//! and the rules of the bus and of the devices are checked on the whole. What is wrong on the way is collected
+//! into one [`ScenarioError`].
+
+use crate::device::profile::Profile;
+use crate::fdl::params::BusParams;
+use crate::sim::motion::Motion;
+use crate::sim::noise::GcJitter;
+use crate::time::{Span, Tbit};
+use crate::wire::Address;
+
+/// A whole scenario, complete and checked.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Scenario {
+    /// The file's name without its extension.
+    pub name: String,
+    /// The file's leading comment: the question, the expected answer, the source.
+    pub question: String,
+    /// How long, and with which draws.
+    pub run: Run,
+    /// The line.
+    pub bus: Bus,
+    /// The only master.
+    pub master: Master,
+    /// The slaves in address order, which is the order of Data_Exchange (Model: D6).
+    pub slaves: Vec<Slave>,
+    /// Slave-to-slave links in the order of the file.
+    pub links: Vec<Link>,
+    /// Orders in the order of the file; at one instant this is the order in which they act.
+    pub events: Vec<Event>,
+    /// Disturbances in the order of the file.
+    pub disturbances: Vec<Disturbance>,
+    /// What to keep.
+    pub record: Record,
+}
+
+impl Scenario {
+    /// The slave with this address.
+    pub fn slave(&self, address: Address) -> Option<&Slave> {
+        self.slaves.binary_search_by_key(&address, |slave| slave.address).ok().map(|index| &self.slaves[index])
+    }
+    /// Whether the slave at `address` is parameterised as publisher.
+    pub fn publishes(&self, address: Address) -> bool {
+        self.links.iter().any(|link| link.publisher == address)
+    }
+}
+
+/// How long a run is and which draws it makes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Run {
+    /// Key of every random stream.
+    pub seed: u64,
+    /// Where the run ends.
+    pub duration: Extent,
+}
+
+/// A length of a run.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Extent {
+    /// True time from power-on, above 0.
+    Time(Span),
+    /// Bus cycles, at least 1.
+    Cycles(u64),
+}
+
+/// The line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Bus {
+    /// Bit rate and the times of the data link layer.
+    pub params: BusParams,
+    /// Length of the cable [mm].
+    pub cable_mm: u64,
+}
+
+/// The master with its application.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Master {
+    /// Its address, 0..=125.
+    pub address: Address,
+    /// Where on the cable it sits [mm].
+    pub position_mm: u64,
+    /// How far its crystal is off.
+    pub crystal: Crystal,
+    /// Bus cycle T_DP (manual 3.3.2).
+    pub t_dp: Span,
+    /// Master application cycle T_MAPC [T_DP], 1..=14 (manual 3.3.3).
+    pub t_mapc: u8,
+    /// The watchdog that it sets in every slave; none is off.
+    pub watchdog: Option<Watchdog>,
+    /// Whether it reads the configuration with Get_Cfg during start-up.
+    pub get_cfg: bool,
+    /// Repeats of an unanswered Data_Exchange, 0..=15 (Model: D7).
+    pub dx_retries: u8,
+    /// Cycles without an answer until a slave counts as lost.
+    pub lost_after: u32,
+    /// Cycles in Clear before it changes to Operate.
+    pub clear_for: u64,
+    /// How its SYNCH strays (Model: D1).
+    pub gc_jitter: GcJitter,
+    /// Whether each stray moves all later SYNCH too (Model: D1).
+    pub accumulate: bool,
+    /// First value of its sign of life, 1..=15 (Model: D17).
+    pub life_start: u8,
+}
+
+/// How far a crystal is off its nominal frequency [10^-9], positive is fast.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Crystal {
+    /// This much.
+    Offset(i64),
+    /// A draw of the station's own, anywhere between minus and plus this.
+    Within(i64),
+}
+
+/// The watchdog of Set_Prm octets 2 and 3: 10 ms x factor 1 x factor 2.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Watchdog {
+    /// WD_Fact_1, 1..=255.
+    pub factor_1: u8,
+    /// WD_Fact_2, 1..=255.
+    pub factor_2: u8,
+}
+
+impl Watchdog {
+    /// Step of the watchdog, WD_Base = 0.
+    pub const BASE: Span = Span::from_ms(10);
+    /// The longest watchdog, about 650 s.
+    pub const MAX: Span = Span::from_ms(10 * 255 * 255);
+
+    /// The watchdog of exactly `span`, with the smallest second factor; `None` if two factors up to 255 cannot make it.
+    pub fn of(span: Span) -> Option<Self> {
+        if span <= Span::ZERO || span > Self::MAX || !span.is_multiple_of(Self::BASE) {
+            return None;
+        }
+        let steps = span.div_floor(Self::BASE);
+        (1..=255)
+            .find(|factor| steps % factor == 0 && steps / factor <= 255)
+            .map(|factor| Self { factor_1: (steps / factor) as u8, factor_2: factor as u8 })
+    }
+    /// How long it runs.
+    pub const fn span(self) -> Span {
+        Span::from_ms(10 * self.factor_1 as i64 * self.factor_2 as i64)
+    }
+}
+
+/// One slave.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Slave {
+    /// Its address, 0..=125.
+    pub address: Address,
+    /// What it is.
+    pub device: &'static Profile,
+    /// Where on the cable it sits [mm].
+    pub position_mm: u64,
+    /// How far its crystal is off.
+    pub crystal: Crystal,
+    /// Its own T_SDR, before a longer min_TSDR of Set_Prm raises it (Model: D2, D27).
+    pub t_sdr: Tbit,
+    /// What its isochronous block sets.
+    pub times: IsoTimes,
+    /// How its shaft moves.
+    pub motion: Motion,
+    /// Tolerated failures of the master's sign of life, octet 24 (manual 3.2.5).
+    pub max_life_failures: u8,
+    /// Tolerated failures of the clock (Model: D15).
+    pub clock_tolerance: u8,
+    /// Octet 15 bit 0 (manual 3.2.1).
+    pub code_sequence: CodeSequence,
+    /// Octet 15 bit 1: scaling, preset and code sequence are in force (manual 3.2.2).
+    pub functions: bool,
+    /// Octet 15 bit 3 with its values (manual 3.2.3, 3.2.4); needs `functions`.
+    pub scaling: Option<Scaling>,
+    /// Configured as the others are, but it never answers.
+    pub silent: bool,
+    /// When its supply comes on [true time].
+    pub powered_at: Span,
+}
+
+/// The instants and the window of one slave's isochronous block.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct IsoTimes {
+    /// T_I, latch before the end of the cycle (manual 3.3.5).
+    pub t_i: Span,
+    /// T_O, set-point transfer after the start of the cycle (manual 3.3.6).
+    pub t_o: Span,
+    /// T_PLL_W, half width of the clock window (manual 3.3.8).
+    pub t_pll_w: Span,
+    /// T_PLL_D, delay of the recovered clock (manual 3.3.9, Model: D13).
+    pub t_pll_d: Span,
+}
+
+/// In which direction the position increases, seen onto the shaft (manual 3.2.1).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum CodeSequence {
+    /// Clockwise.
+    Cw,
+    /// Counter-clockwise.
+    Ccw,
+}
+
+/// Scaling of the position.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Scaling {
+    /// Measuring units per revolution [counts], octets 16..=19 (manual 3.2.3).
+    pub units_per_rev: u32,
+    /// Total measuring range [counts], octets 20..=23 (manual 3.2.4).
+    pub total_range: u32,
+}
+
+/// One slave-to-slave link (manual 3.4).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Link {
+    /// Whose inputs.
+    pub publisher: Address,
+    /// Who takes them.
+    pub subscriber: Address,
+    /// Where the sample begins in the publisher's inputs [octets].
+    pub offset: u8,
+    /// Length of the sample [octets].
+    pub length: u8,
+}
+
+/// An order at an instant.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Event {
+    /// When.
+    pub when: When,
+    /// Which slaves it is about, in address order; empty for an order to the master alone.
+    pub slaves: Vec<Address>,
+    /// What to do.
+    pub action: Action,
+}
+
+/// An instant of a run.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum When {
+    /// True time since power-on.
+    Time(Span),
+    /// The beginning of this bus cycle, counted from 0.
+    Cycle(u64),
+}
+
+/// What a scenario can order.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Action {
+    /// The master sets G1_STW.15 until the fault is acknowledged.
+    Acknowledge,
+    /// The master stops counting its sign of life.
+    HoldLifeSign {
+        /// For so many bus cycles; none is until it is released.
+        cycles: Option<u32>,
+    },
+    /// The master counts its sign of life again.
+    ReleaseLifeSign,
+    /// The master's sign of life jumps.
+    JumpLifeSign {
+        /// To this value, 0..=15.
+        to: u8,
+    },
+    /// The master sends this sensor control word G1_STW from now on.
+    ControlWord {
+        /// The word.
+        value: u16,
+    },
+    /// The supply of the slaves goes off.
+    PowerOff,
+    /// The supply of the slaves comes on.
+    PowerOn,
+    /// The master changes to Clear.
+    Clear,
+    /// The master changes to Operate.
+    Operate,
+}
+
+/// Something that goes wrong on the line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Disturbance {
+    /// The master's SYNCH never reaches the line.
+    MissingClocks {
+        /// In which cycles.
+        bursts: Bursts,
+    },
+    /// Telegrams reach nobody.
+    LostTelegrams {
+        /// Who sent them; none is anybody.
+        from: Option<Address>,
+        /// Whom they are for; none is anybody.
+        to: Option<Address>,
+        /// Which.
+        service: Service,
+        /// In which cycles.
+        bursts: Bursts,
+    },
+}
+
+/// Bus cycles in which something happens: `count` from `from_cycle` on, and again every `every` cycles.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Bursts {
+    /// The first one, counted from 0.
+    pub from_cycle: u64,
+    /// How many in a row, at least 1.
+    pub count: u64,
+    /// From the beginning of one burst to the next, at least `count`; none is one burst alone.
+    pub every: Option<u64>,
+}
+
+impl Bursts {
+    /// Whether it happens in `cycle`.
+    pub const fn contains(&self, cycle: u64) -> bool {
+        let Some(since) = cycle.checked_sub(self.from_cycle) else { return false };
+        match self.every {
+            Some(every) => since % every < self.count,
+            None => since < self.count,
+        }
+    }
+}
+
+/// Which telegrams a disturbance is about.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Service {
+    /// Data_Exchange alone, requests and replies.
+    DataExchange,
+    /// All.
+    Any,
+}
+
+/// What a run keeps.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Record {
+    /// Whether anything is written at all.
+    pub files: bool,
+    /// Whether plots are drawn.
+    pub plots: bool,
+    /// Which CSV files are written.
+    pub tables: Vec<CsvTable>,
+    /// Most rows that a CSV file keeps before it is thinned, at least 1.
+    pub rows: u64,
+}
+
+/// A CSV file.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum CsvTable {
+    /// A row per cycle.
+    Cycles,
+    /// A row per slave and cycle.
+    Slaves,
+    /// A row per link and cycle.
+    Links,
+    /// A row per event.
+    Events,
+}
+
+impl CsvTable {
+    /// Every table with the key that switches it on and off.
+    pub const ALL: &'static [(&'static str, Self)] = &[
+        ("cycles_csv", Self::Cycles),
+        ("slaves_csv", Self::Slaves),
+        ("links_csv", Self::Links),
+        ("events_csv", Self::Events),
+    ];
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_watchdog_is_a_product_of_two_factors() {
+        let factors = |ms| Watchdog::of(Span::from_ms(ms)).map(|w| (w.factor_1, w.factor_2));
+        assert_eq!(factors(200), Some((20, 1)));
+        assert_eq!(factors(2_560), Some((128, 2)));
+        assert_eq!(factors(650_250), Some((255, 255)));
+        // 257 is a prime, 205 is no multiple of 10, and the rest is out of range.
+        assert_eq!([2_570, 205, 0, -10, 650_260].map(factors), [None; 5]);
+        for ms in (10..20_000).step_by(10) {
+            if let Some(watchdog) = Watchdog::of(Span::from_ms(ms)) {
+                assert_eq!(watchdog.span(), Span::from_ms(ms));
+            }
+        }
+    }
+
+    #[test]
+    fn bursts_repeat() {
+        let at = |bursts: Bursts| (0..12).filter(|&cycle| bursts.contains(cycle)).collect::<Vec<_>>();
+        assert_eq!(at(Bursts { from_cycle: 3, count: 2, every: None }), [3, 4]);
+        assert_eq!(at(Bursts { from_cycle: 1, count: 2, every: Some(5) }), [1, 2, 6, 7, 11]);
+    }
+}
