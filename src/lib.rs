@@ -3,5 +3,13 @@
 
 extern crate alloc;
 
+pub mod device;
+pub mod dp;
+pub mod fdl;
+pub mod observation;
+#[cfg(feature = "sim")]
+pub mod sim;
+#[cfg(feature = "sim")]
+pub mod study;
 pub mod time;
 pub mod wire;

@@ -68,6 +68,7 @@ impl Span {
         self.as_ns() / 1e9
     }
     /// Magnitude. Only for comparing with a half width; a signed quantity is recorded with its sign.
+    #[must_use]
     pub const fn abs(self) -> Self {
         Self(self.0.abs())
     }
@@ -76,6 +77,7 @@ impl Span {
         self.0.div_euclid(step.0)
     }
     /// The next multiple of `step` not below this span.
+    #[must_use]
     pub const fn ceil_to(self, step: Self) -> Self {
         Self((self.0 + step.0 - 1).div_euclid(step.0) * step.0)
     }

@@ -251,8 +251,10 @@ fn record_len(pdu: &[u8]) -> Result<(Record, u8), AcyclicError> {
 }
 fn record_data(pdu: &[u8]) -> Result<(Record, &[u8]), AcyclicError> {
     match pdu {
-        &[_, slot, index, len, ref data @ ..] if data.len() == usize::from(len) => Ok((Record { slot, index }, data)),
-        &[_, _, _, len, ..] => Err(AcyclicError::new(4, AcyclicRule::DataLength, len)),
+        [_, slot, index, len, data @ ..] if data.len() == usize::from(*len) => {
+            Ok((Record { slot: *slot, index: *index }, data))
+        }
+        [_, _, _, len, ..] => Err(AcyclicError::new(4, AcyclicRule::DataLength, *len)),
         _ => Err(wrong_length(pdu)),
     }
 }

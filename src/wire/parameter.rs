@@ -241,7 +241,7 @@ impl<'a> Values<'a> {
 }
 
 /// Iterator over values, each with everything behind it already checked.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 struct Checked<'a>(&'a [u8]);
 
 impl<'a> Checked<'a> {
@@ -269,7 +269,7 @@ impl<'a> Iterator for Checked<'a> {
 }
 
 /// A request for one or more parameters.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Request<'a> {
     /// Octet 1: chosen by the master, mirrored by the slave.
     pub reference: u8,
@@ -309,7 +309,7 @@ impl<'a> Request<'a> {
     }
     /// The values of a change request, one for each parameter.
     pub fn values(&self) -> impl Iterator<Item = Values<'a>> + use<'a> {
-        self.values
+        self.values.clone()
     }
 }
 
@@ -333,7 +333,7 @@ pub fn emit_request(
 }
 
 /// The answer to a [`Request`].
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Response<'a> {
     /// Octet 1: as in the request.
     pub reference: u8,
@@ -362,7 +362,7 @@ impl<'a> Response<'a> {
     }
     /// The values or errors, one for each parameter; none when all were changed.
     pub fn values(&self) -> impl Iterator<Item = Values<'a>> + use<'a> {
-        self.values
+        self.values.clone()
     }
 }
 

@@ -550,7 +550,7 @@ impl DxbLink {
         self.check_at([octet, octet + 1, octet + 2, octet + 3], buffer)
     }
     /// As [`DxbLink::check`] with the octet number of each field.
-    fn check_at(&self, octets: [usize; 4], buffer: u8) -> Result<(), PrmError> {
+    fn check_at(self, octets: [usize; 4], buffer: u8) -> Result<(), PrmError> {
         let [publisher, length, offset, sample] = octets;
         let end = u16::from(self.offset) + u16::from(self.sample);
         if self.publisher > PUBLISHER_MAX {

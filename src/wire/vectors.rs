@@ -40,12 +40,12 @@ fn request(service: Service, fcb: Fcb) -> Header {
     Header::request(encoder(), master(), service, fcb)
 }
 fn request_at(sap: Sap, service: Service, fcb: Fcb) -> Header {
-    let ssap = match sap {
+    let masters = match sap {
         Sap::MS1 => Sap::MASTER_MS1,
         sap if sap <= Sap::MS2_RM => Sap::MASTER_MS2,
         _ => Sap::MASTER_MS0,
     };
-    request(service, fcb).with_saps(sap, ssap)
+    request(service, fcb).with_saps(sap, masters)
 }
 fn reply_at(sap: Sap) -> Header {
     request_at(sap, SRD, Fcb::First).slave_reply(Status::Dl)
@@ -348,13 +348,13 @@ fn ms2_opens_a_connection() {
 
 #[test]
 fn every_other_acyclic_pdu_reads_as_it_was_written() {
+    use acyclic::{Request, Response};
     let record = Record { slot: 1, index: 2 };
     let ends = Ends { source_type: 0, source: &[1, 2], destination_type: 1, destination: &[3, 4, 5, 6, 7, 8, 9, 10] };
     let initiated = InitiateRes { max_len: 240, features: [1, 0], profile_features: [0; 2], profile_ident: 1, ends };
     let abort = Abort { subnet: 2, reason: 0x23, detail: 0 };
     assert_eq!((abort.instance(), abort.code()), (2, 3));
     let mut out = [0; MAX_DU];
-    use acyclic::{Request, Response};
     for response in [
         Response::Read { record, data: &[1, 2, 3] },
         Response::DataTransport { record, data: &[4] },

@@ -1,0 +1,4 @@
+//! The slave's application: what makes an encoder out of a DP slave. Machines on the station's own clock alone.
+
+pub mod pll;
+pub mod sign_of_life;

@@ -1,0 +1,251 @@
+//! The data link layer: the station contract, bus parameters, the active and the passive station.
+//!
+//! A station is a value. It is told what happened at which reading of its own crystal and answers with an
+//! [`Outbox`]: telegrams to send, deadlines to arm, observations. Nothing else goes in or out, so the same machine
+//! runs in the simulator, in a test and in firmware.
+
+pub mod active;
+pub mod params;
+pub mod passive;
+
+use crate::observation::Observation;
+use crate::time::{Local, Span};
+use crate::wire::{Address, Frame};
+
+/// A machine on the bus.
+pub trait Station {
+    /// What a scenario may order this station to do.
+    type Command: Copy;
+
+    /// The station's own address.
+    fn address(&self) -> Address;
+
+    /// Which telegrams this station wants to hear. May change after every step.
+    fn filter(&self) -> Filter;
+
+    /// Takes `input`, which happened at `now`, and answers into `out`. `out` is empty on entry; `now` never runs
+    /// backwards from call to call.
+    fn step(&mut self, now: Local, input: Input<'_, Self::Command>, out: &mut Outbox);
+}
+
+/// What can happen to a station.
+#[derive(Clone, Copy, Debug)]
+pub enum Input<'a, C> {
+    /// The supply came on. The first input of every station.
+    PowerOn,
+    /// The last bit of a telegram arrived. The octets may be disturbed.
+    Telegram(Heard<'a>),
+    /// The last bit of the telegram that asked for it ([`Outbox::send_clock`]) has left this station.
+    Sent,
+    /// An armed deadline came due.
+    Deadline {
+        /// Which one.
+        timer: Timer,
+        /// Whether this station's receiver sees characters on the line at this instant.
+        busy: bool,
+    },
+    /// The instant of [`Outbox::sample_at`] came; the shaft was at this raw position [steps].
+    Sample(u32),
+    /// The scenario orders something.
+    Command(C),
+}
+
+/// A telegram as it arrived.
+#[derive(Clone, Copy, Debug)]
+pub struct Heard<'a> {
+    /// The characters, start delimiter to end delimiter.
+    pub octets: &'a [u8],
+    /// Raw position of the shaft [steps] at this instant, if the station has asked for it
+    /// ([`Outbox::sample_with_telegrams`]); zero otherwise.
+    pub sample: u32,
+}
+
+/// Which telegrams reach a station's machine. The rest is dropped by its receiver, as the hardware does.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Filter {
+    /// Everything, as an active station needs.
+    pub all: bool,
+    /// Own address, besides broadcasts (127).
+    pub own: Address,
+    /// Senders whose replies to 127 (slave to slave) are wanted: bit n is address n.
+    pub publishers: u128,
+}
+
+impl Filter {
+    /// Own address and broadcasts by masters.
+    pub const fn own(own: Address) -> Self {
+        Self { all: false, own, publishers: 0 }
+    }
+    /// Everything on the line.
+    pub const fn all(own: Address) -> Self {
+        Self { all: true, own, publishers: 0 }
+    }
+    /// Whether a telegram with these octets passes. Looks at the octets as they are, disturbed or not.
+    #[inline]
+    pub fn passes(&self, octets: &[u8]) -> bool {
+        // Destination and source sit at 1, 2 behind SD1, SD3 and SD4 and at 4, 5 behind SD2; bit 7 announces a SAP.
+        let (da, sa, fc) = match octets {
+            [0x68, _, _, _, da, sa, fc, ..] | [0x10 | 0xA2, da, sa, fc, ..] => (da & 0x7F, sa & 0x7F, *fc),
+            _ => return self.all,
+        };
+        let is_reply = fc & 0x40 == 0;
+        self.all
+            || da == self.own.get()
+            || (da == Address::BROADCAST.get() && (!is_reply || self.publishers >> sa & 1 == 1))
+    }
+}
+
+/// Named deadlines of a station. Each is armed at most once at a time.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+#[repr(u8)]
+pub enum Timer {
+    /// Slot time T_SL, and the silence T_TO before a token is claimed.
+    Slot,
+    /// The next thing the active station has planned.
+    Schedule,
+    /// The DP watchdog (`EN 50170-2`).
+    Watchdog,
+    /// The clock's window closes.
+    Window,
+    /// T_O.
+    SetPoint,
+}
+
+impl Timer {
+    /// Every timer, in the order of their numbers.
+    pub const ALL: [Self; 5] = [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint];
+}
+
+/// A station's answer to one input. Reused from step to step, so that no step allocates.
+#[derive(Debug)]
+pub struct Outbox {
+    frame: Frame,
+    send: Option<Send>,
+    arm: [Order; Timer::ALL.len()],
+    sample: Order,
+    sample_with_telegrams: Option<bool>,
+    observations: [Option<Observation>; Self::MAX_OBSERVATIONS],
+    observed: usize,
+}
+
+/// When a telegram is to be sent.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Send {
+    /// First bit on the line.
+    pub at: Local,
+    /// The clock telegram: the master's jitter applies to it, and [`Input::Sent`] follows its last bit.
+    pub clock: bool,
+}
+
+/// What is to become of a deadline.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Order {
+    /// Leave it.
+    #[default]
+    Keep,
+    /// Arm it, whatever it was.
+    At(Local),
+    /// Disarm it.
+    Off,
+}
+
+impl Default for Outbox {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Outbox {
+    /// Observations that one step may make. A step that needs more is a bug.
+    pub const MAX_OBSERVATIONS: usize = 16;
+
+    /// An empty outbox.
+    pub const fn new() -> Self {
+        Self {
+            frame: Frame::new(),
+            send: None,
+            arm: [Order::Keep; Timer::ALL.len()],
+            sample: Order::Keep,
+            sample_with_telegrams: None,
+            observations: [None; Self::MAX_OBSERVATIONS],
+            observed: 0,
+        }
+    }
+
+    /// Makes it empty for the next step.
+    pub fn clear(&mut self) {
+        self.send = None;
+        self.arm = [Order::Keep; Timer::ALL.len()];
+        self.sample = Order::Keep;
+        self.sample_with_telegrams = None;
+        self.observed = 0;
+    }
+
+    /// Sends the telegram that `fill` writes, its first bit at `at`. One telegram per step.
+    ///
+    /// # Panics
+    /// When this step has sent one already.
+    pub fn send(&mut self, at: Local, fill: impl FnOnce(&mut Frame)) {
+        assert!(self.send.is_none(), "a step sends one telegram at most");
+        fill(&mut self.frame);
+        self.send = Some(Send { at, clock: false });
+    }
+
+    /// As [`send`](Self::send), for the clock telegram: [`Input::Sent`] comes when its last bit has left.
+    pub fn send_clock(&mut self, at: Local, fill: impl FnOnce(&mut Frame)) {
+        self.send(at, fill);
+        self.send = Some(Send { at, clock: true });
+    }
+
+    /// Arms `timer`; an earlier arming is forgotten.
+    pub fn arm(&mut self, timer: Timer, at: Local) {
+        self.arm[timer as usize] = Order::At(at);
+    }
+    /// Disarms `timer`.
+    pub fn disarm(&mut self, timer: Timer) {
+        self.arm[timer as usize] = Order::Off;
+    }
+    /// Asks for the raw position of the shaft at `at`; [`Input::Sample`] brings it. One at a time.
+    pub fn sample_at(&mut self, at: Local) {
+        self.sample = Order::At(at);
+    }
+    /// Forgets an asked sample.
+    pub fn cancel_sample(&mut self) {
+        self.sample = Order::Off;
+    }
+    /// From now on every telegram brings the shaft's raw position along, or no more (Model: D8).
+    pub fn sample_with_telegrams(&mut self, on: bool) {
+        self.sample_with_telegrams = Some(on);
+    }
+    /// Tells what was seen or done.
+    pub fn observe(&mut self, observation: Observation) {
+        self.observations[self.observed] = Some(observation);
+        self.observed += 1;
+    }
+
+    /// The telegram to send, if there is one.
+    pub fn sending(&self) -> Option<(Send, &Frame)> {
+        self.send.map(|send| (send, &self.frame))
+    }
+    /// What becomes of the deadlines, by [`Timer`] number.
+    pub fn orders(&self) -> &[Order; Timer::ALL.len()] {
+        &self.arm
+    }
+    /// What becomes of the asked sample.
+    pub fn sample_order(&self) -> Order {
+        self.sample
+    }
+    /// Whether telegrams shall bring the shaft's position, where that changed.
+    pub fn sampling_with_telegrams(&self) -> Option<bool> {
+        self.sample_with_telegrams
+    }
+    /// What was observed, in order.
+    pub fn observations(&self) -> impl Iterator<Item = &Observation> {
+        self.observations[..self.observed].iter().flatten()
+    }
+}
+
+/// The span after which a receiver takes a running telegram for broken: it never waits longer for its end.
+pub const fn longest_telegram(rate: crate::time::BitRate) -> Span {
+    rate.octets(crate::wire::MAX_FRAME)
+}

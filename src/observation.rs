@@ -1,0 +1,478 @@
+//! Everything that can be observed, as plain data.
+//!
+//! Stations emit observations and never see who reads them. An observation carries no instant of its own: the
+//! simulator stamps each with the true time and the station that made it. Metrics, traces, exports, fingerprints
+//! and tests all read this one stream.
+
+use core::fmt;
+
+use crate::time::{Local, Span};
+use crate::wire::Address;
+
+macro_rules! named {
+    ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+        #[repr(u8)]
+        pub enum $name { $($(#[$vdoc])* $variant,)* }
+
+        impl $name {
+            /// Every value, in order.
+            pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
+
+            /// The name as reports print it.
+            pub const fn text(self) -> &'static str {
+                match self { $(Self::$variant => $text,)* }
+            }
+        }
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.pad(self.text())
+            }
+        }
+    };
+}
+
+named! {
+    /// Operation mode of a class 1 master.
+    MasterMode {
+        /// No bus activity.
+        Offline = "Offline",
+        /// In the ring, no DP traffic.
+        Stop = "Stop",
+        /// Slaves are parameterised and polled, outputs are zero.
+        Clear = "Clear",
+        /// Outputs are valid.
+        Operate = "Operate",
+    }
+}
+named! {
+    /// State of a DP slave (EN 50170-2).
+    SlaveState {
+        /// Own initialisation.
+        PowerOn = "POWER_ON",
+        /// Waits for Set_Prm.
+        WaitPrm = "WAIT_PRM",
+        /// Waits for Chk_Cfg.
+        WaitCfg = "WAIT_CFG",
+        /// Exchanges data.
+        DataExch = "DATA_EXCH",
+    }
+}
+named! {
+    /// Why a DP slave changed its state.
+    SlaveCause {
+        /// Own initialisation is finished.
+        Initialised = "initialised",
+        /// A good Set_Prm.
+        Parameterised = "Set_Prm accepted",
+        /// A Set_Prm that breaks a rule.
+        PrmFault = "Prm_Fault",
+        /// A good Chk_Cfg.
+        Configured = "Chk_Cfg accepted",
+        /// A Chk_Cfg that does not fit.
+        CfgFault = "Cfg_Fault",
+        /// Unlocked by its master.
+        Unlocked = "unlocked",
+        /// The watchdog ran out.
+        Watchdog = "watchdog",
+        /// Data_Exchange with a wrong length.
+        OutputLength = "output length",
+        /// Power off and on, or a command of the scenario.
+        Restart = "restart",
+    }
+}
+named! {
+    /// What the master does with one slave.
+    HandlerState {
+        /// Asks for diagnosis until the slave answers.
+        Diagnose = "Slave_Diag",
+        /// Reads the configuration back.
+        GetCfg = "Get_Cfg",
+        /// Sends parameters.
+        SetPrm = "Set_Prm",
+        /// Sends the configuration.
+        ChkCfg = "Chk_Cfg",
+        /// Reads diagnosis until the slave is ready.
+        AwaitReady = "await ready",
+        /// Exchanges data.
+        DataExchange = "Data_Exchange",
+    }
+}
+named! {
+    /// Start-up phases of an isochronous slave (manual 2.1.1 to 2.1.5).
+    Phase {
+        /// Parameters and configuration (manual 2.1.1).
+        Configuration = "1 configuration",
+        /// Synchronising to the clock (manual 2.1.2).
+        Clock = "2 clock",
+        /// Synchronising to the master's sign of life (manual 2.1.3).
+        MasterLife = "3 master sign of life",
+        /// The master synchronises to the slave's sign of life (manual 2.1.4).
+        SlaveLife = "4 slave sign of life",
+        /// Cyclic operation (manual 2.1.5).
+        Operation = "5 operation",
+    }
+}
+named! {
+    /// State of a slave's clock recovery (Model: D11, D12).
+    PllState {
+        /// Not started.
+        Idle = "idle",
+        /// Waits for the first SYNCH.
+        Waiting = "waiting",
+        /// The window is being narrowed.
+        Narrowing = "narrowing",
+        /// Final width, not yet locked.
+        Settling = "settling",
+        /// Locked.
+        Locked = "locked",
+    }
+}
+named! {
+    /// What a slave made of one clock instant (Model: D11).
+    ClockVerdict {
+        /// The first SYNCH, from which the prediction starts.
+        First = "first",
+        /// Inside the window.
+        Hit = "hit",
+        /// A SYNCH outside the window: a clock failure.
+        Outside = "outside",
+        /// No SYNCH until the window closed: a clock failure.
+        Missing = "missing",
+        /// A SYNCH of a cycle that was judged before; ignored.
+        Stray = "stray",
+    }
+}
+named! {
+    /// State of a sign-of-life monitor, on either side (Model: D16, D17).
+    LifeState {
+        /// Waits for a first change to a non-zero value.
+        Waiting = "waiting",
+        /// Counts correct steps, no tolerance.
+        Strict = "strict",
+        /// Synchronised, the other side follows; no tolerance yet.
+        Confirming = "confirming",
+        /// Tolerant monitoring.
+        Operating = "operating",
+    }
+}
+named! {
+    /// State of a slave-to-slave link in the subscriber (Model: D27).
+    LinkState {
+        /// Nothing valid came yet, or not for the watchdog time.
+        Lost = "lost",
+        /// Valid data came within the watchdog time.
+        Active = "active",
+        /// The publisher's data have another length than parameterised.
+        LengthError = "length error",
+    }
+}
+named! {
+    /// What a GAP poll found.
+    GapAnswer {
+        /// No answer within T_SL.
+        Absent = "absent",
+        /// A passive station.
+        Slave = "slave",
+        /// An active station, not ready for the ring.
+        NotReady = "master, not ready",
+        /// An active station, ready for the ring.
+        Ready = "master, ready",
+        /// An active station in the ring.
+        InRing = "master, in ring",
+    }
+}
+
+/// Something a station saw or did. Instants are readings of the station's own crystal.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Observation {
+    // ----- master
+    /// A DP cycle began: the last bit of SYNCH has just left the master (Model: D1).
+    CycleStart {
+        /// Number of the cycle, from 0.
+        cycle: u64,
+        /// Where the master aimed, on its own jitter-free grid.
+        nominal: Local,
+    },
+    /// The Data_Exchange part is over: last bit of the last reply at the master, or the end of its slot time.
+    ExchangeDone {
+        /// From t0 to here (Model: D2).
+        t_dx: Span,
+        /// Repeated requests in this part.
+        retries: u32,
+    },
+    /// Everything of this cycle is sent; silence until the next SYNCH (Model: D6).
+    CycleSpare {
+        /// From the end of the Data_Exchange part to the end of the token.
+        acyclic: Span,
+        /// From here to the first bit of the next SYNCH.
+        spare: Span,
+    },
+    /// SYNCH could not be sent at its planned instant, the bus was still in use.
+    ClockLate {
+        /// How late its sending begins.
+        by: Span,
+    },
+    /// The master's operation mode changed.
+    MasterMode {
+        /// Before.
+        from: MasterMode,
+        /// Now.
+        to: MasterMode,
+    },
+    /// What the master does with one slave changed.
+    Handler {
+        /// The slave.
+        slave: Address,
+        /// Before.
+        from: HandlerState,
+        /// Now.
+        to: HandlerState,
+    },
+    /// A request without answer is sent again.
+    Retry {
+        /// To whom.
+        slave: Address,
+    },
+    /// No answer after all retries.
+    NoAnswer {
+        /// From whom.
+        slave: Address,
+    },
+    /// An answer that does not fit its request.
+    IllegalAnswer {
+        /// From whom.
+        slave: Address,
+    },
+    /// A slave's diagnosis as the master read it.
+    Diagnosis {
+        /// Whose.
+        slave: Address,
+        /// Octets 1 to 3.
+        status: [u8; 3],
+    },
+    /// A GAP poll and what it found.
+    Gap {
+        /// The polled address.
+        address: Address,
+        /// The answer.
+        answer: GapAnswer,
+    },
+    /// The token was claimed after T_TO of silence.
+    TokenClaimed,
+    /// The master application's check of one slave's sign of life changed its state (Model: D17).
+    SlaveLife {
+        /// Whose.
+        slave: Address,
+        /// Before.
+        from: LifeState,
+        /// Now.
+        to: LifeState,
+        /// Whether the failure counter went over its limit.
+        tripped: bool,
+    },
+    /// The master application counts its sign of life for a slave no further, or again.
+    MasterLifeHeld {
+        /// For whom.
+        slave: Address,
+        /// Held or running.
+        held: bool,
+    },
+
+    // ----- slave
+    /// A slave's DP state changed.
+    SlaveState {
+        /// Before.
+        from: SlaveState,
+        /// Now.
+        to: SlaveState,
+        /// Why.
+        cause: SlaveCause,
+    },
+    /// A start-up phase was entered.
+    Phase {
+        /// Before.
+        from: Phase,
+        /// Now.
+        to: Phase,
+    },
+    /// A slave judged one clock instant.
+    Clock {
+        /// The verdict.
+        verdict: ClockVerdict,
+        /// Arrival minus prediction; zero for `First` and `Missing`.
+        error: Span,
+        /// Recovered period.
+        period: Span,
+        /// Half width of the window in force.
+        window: Span,
+        /// Clock failure counter, ten per failure.
+        counter: u16,
+    },
+    /// The state of the clock recovery changed.
+    Pll {
+        /// Before.
+        from: PllState,
+        /// Now.
+        to: PllState,
+    },
+    /// The position was latched (manual 3.3.5).
+    Latch {
+        /// At T_I of a locked clock, or free-running at a request (Model: D8).
+        locked: bool,
+        /// What the next reply will carry.
+        inputs: Inputs,
+    },
+    /// T_O: set points take effect and the sign of life is compared (manual 3.3.6).
+    SetPoint {
+        /// Master's sign of life.
+        mls: u8,
+        /// Own sign of life from now on.
+        sls: u8,
+        /// Sign-of-life failure counter, ten per failure.
+        counter: u16,
+        /// Whether the value was as expected.
+        expected: bool,
+    },
+    /// The sign-of-life monitor changed its state.
+    MasterLife {
+        /// Before.
+        from: LifeState,
+        /// Now.
+        to: LifeState,
+    },
+    /// A fault was latched (manual 5.3).
+    Fault {
+        /// Code in `G1_XIST2`.
+        code: u16,
+    },
+    /// A fault was acknowledged (`G1_STW` bit 15).
+    Acknowledged {
+        /// Code in `G1_XIST2` until now.
+        code: u16,
+    },
+
+    // ----- slave to slave
+    /// A publisher's reply was taken over by a subscriber.
+    Subscribed {
+        /// Whose.
+        publisher: Address,
+    },
+    /// A subscriber used a publisher's value at its T_O.
+    Used {
+        /// Whose.
+        publisher: Address,
+        /// The value [steps].
+        position: u32,
+    },
+    /// The state of a link changed.
+    Link {
+        /// The publisher.
+        publisher: Address,
+        /// Before.
+        from: LinkState,
+        /// Now.
+        to: LinkState,
+    },
+
+    // ----- bus, made by the simulator for the sending station
+    /// Two telegrams overlapped on the line; the second one began during the first.
+    Collision {
+        /// Who was sending already.
+        with: Address,
+    },
+    /// The scenario disturbed a telegram of this station.
+    Disturbed {
+        /// How.
+        how: Disturbance,
+    },
+}
+
+named! {
+    /// What the scenario did to one telegram.
+    Disturbance {
+        /// It never reached the line.
+        Lost = "telegram lost",
+    }
+}
+
+/// The twelve octets of telegram 81 from a slave as words (manual 2.2).
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Inputs {
+    /// `ZSW2`: bits 15..12 are the slave's sign of life.
+    pub zsw2: u16,
+    /// `G1_ZSW`.
+    pub g1_zsw: u16,
+    /// `G1_XIST1`, left-justified position.
+    pub xist1: u32,
+    /// `G1_XIST2`, right-justified position or fault code.
+    pub xist2: u32,
+}
+
+impl Observation {
+    /// Whether this happens rarely and belongs into a log of events, rather than once or more in every cycle.
+    pub const fn is_event(&self) -> bool {
+        !matches!(
+            self,
+            Self::CycleStart { .. }
+                | Self::ExchangeDone { .. }
+                | Self::CycleSpare { .. }
+                | Self::Clock { verdict: ClockVerdict::Hit, .. }
+                | Self::Latch { .. }
+                | Self::SetPoint { expected: true, .. }
+                | Self::Subscribed { .. }
+                | Self::Used { .. }
+                | Self::Gap { .. }
+        )
+    }
+}
+
+/// One line in the field's words.
+impl fmt::Display for Observation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::CycleStart { cycle, .. } => write!(f, "cycle {cycle} starts"),
+            Self::ExchangeDone { t_dx, retries } => write!(f, "T_DX {t_dx}, {retries} retries"),
+            Self::CycleSpare { acyclic, spare } => write!(f, "acyclic part and token {acyclic}, spare {spare}"),
+            Self::ClockLate { by } => write!(f, "SYNCH {by} late, the bus was in use"),
+            Self::MasterMode { from, to } => write!(f, "master {from} -> {to}"),
+            Self::Handler { slave, from, to } => write!(f, "slave {slave}: {from} -> {to}"),
+            Self::Retry { slave } => write!(f, "slave {slave}: request repeated"),
+            Self::NoAnswer { slave } => write!(f, "slave {slave}: no answer"),
+            Self::IllegalAnswer { slave } => write!(f, "slave {slave}: illegal answer"),
+            Self::Diagnosis { slave, status: [a, b, c] } => {
+                write!(f, "slave {slave}: diagnosis {a:02X} {b:02X} {c:02X}")
+            }
+            Self::Gap { address, answer } => write!(f, "GAP {address}: {answer}"),
+            Self::TokenClaimed => f.write_str("token claimed"),
+            Self::SlaveLife { slave, from, to, tripped } => {
+                write!(f, "slave {slave}: its sign of life {from} -> {to}{}", if *tripped { ", FAULT" } else { "" })
+            }
+            Self::MasterLifeHeld { slave, held } => {
+                write!(f, "master sign of life for {slave} {}", if *held { "held" } else { "running" })
+            }
+            Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
+            Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
+            Self::Clock { verdict, error, window, counter, .. } => {
+                write!(f, "clock {verdict}, error {error}, window {window}, failure counter {counter}")
+            }
+            Self::Pll { from, to } => write!(f, "PLL {from} -> {to}"),
+            Self::Latch { locked, inputs } => {
+                write!(f, "latch {} ({})", inputs.xist1, if *locked { "at T_I" } else { "free-running" })
+            }
+            Self::SetPoint { mls, sls, counter, expected } => {
+                let verdict = if *expected { "expected" } else { "NOT EXPECTED" };
+                write!(f, "T_O, master sign of life {mls} {verdict}, own {sls}, failure counter {counter}")
+            }
+            Self::MasterLife { from, to } => write!(f, "master sign of life {from} -> {to}"),
+            Self::Fault { code } => write!(f, "fault {code:04X}"),
+            Self::Acknowledged { code } => write!(f, "fault {code:04X} acknowledged"),
+            Self::Subscribed { publisher } => write!(f, "data of publisher {publisher}"),
+            Self::Used { publisher, position } => write!(f, "position {position} of publisher {publisher} used"),
+            Self::Link { publisher, from, to } => write!(f, "link to {publisher}: {from} -> {to}"),
+            Self::Collision { with } => write!(f, "collision with {with}"),
+            Self::Disturbed { how } => write!(f, "disturbed: {how}"),
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! The world between the stations: crystals, noise, moving shafts and the order of events.
+//!
+//! Only this layer and those above it know true time. Everything here is decided by integers, draws from streams that
+//! have a name, and computes transcendental functions in Rust, so a run is the same on every machine.
+
+pub mod crystal;
+pub mod motion;
+pub mod noise;
+pub mod queue;
