@@ -348,7 +348,7 @@ impl<'a> InitiateReq<'a> {
 /// `Initiate` response: `57`, longest data unit, features, profile, ends; 16 octets with the shortest addresses.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct InitiateRes<'a> {
-    /// Octet 2, `Max_Len_Data_Unit` [octets].
+    /// Octet 2, `Max_Len_Data_Unit` (octets).
     pub max_len: u8,
     /// Octets 3..=4, `Features_Supported`.
     pub features: [u8; 2],

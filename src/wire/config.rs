@@ -20,7 +20,7 @@ rules! {
 /// What one identifier exchanges in one direction.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Part {
-    /// Length [octets].
+    /// Length (octets).
     pub octets: u8,
     /// Counted in words of two octets.
     pub words: bool,

@@ -191,7 +191,7 @@ pub enum TelegramError {
         /// The octet in its place.
         found: u8,
     },
-    /// The frame is longer or shorter than its start and its LE say [octets].
+    /// The frame is longer or shorter than its start and its LE say (octets).
     Length {
         /// The right length; for an SD2 cut off before its second start delimiter, the least.
         expected: usize,
@@ -256,7 +256,7 @@ pub enum TelegramError {
         /// The extension octet.
         found: u8,
     },
-    /// The data unit to write does not fit [octets].
+    /// The data unit to write does not fit (octets).
     DataUnit {
         /// The longest that fits behind these service access points.
         most: usize,
@@ -339,7 +339,7 @@ impl Frame {
     pub fn octets_mut(&mut self) -> &mut [u8] {
         &mut self.octets[..usize::from(self.len)]
     }
-    /// Length [octets].
+    /// Length (octets).
     pub const fn len(&self) -> usize {
         self.len as usize
     }
