@@ -106,23 +106,24 @@ impl Handler {
 
     /// Takes the answer to [`service`](Self::service). Tells whether the slave has just joined data exchange.
     pub fn answered(&mut self, answer: Answer<'_>, out: &mut Outbox) -> bool {
-        let next = match (self.state, answer) {
-            (HandlerState::Diagnose, Answer::Data(du)) if self.diagnosis(du, out).is_some() => {
-                if self.params.get_cfg { HandlerState::GetCfg } else { HandlerState::SetPrm }
-            }
-            (HandlerState::GetCfg, Answer::Data(_)) => HandlerState::SetPrm,
-            (HandlerState::SetPrm, Answer::Acknowledged) => HandlerState::ChkCfg,
-            (HandlerState::ChkCfg, Answer::Acknowledged) => HandlerState::AwaitReady,
-            (HandlerState::AwaitReady, Answer::Data(du)) => match self.diagnosis(du, out) {
-                Some(status) => after_diagnosis(status),
-                None => HandlerState::Diagnose,
-            },
-            (_, Answer::Nothing) => HandlerState::Diagnose,
-            _ => {
-                out.observe(Observation::IllegalAnswer { slave: self.params.address });
-                HandlerState::Diagnose
-            }
-        };
+        let next =
+            match (self.state, answer) {
+                (HandlerState::Diagnose, Answer::Data(du)) if self.diagnosis(du, out).is_some() => {
+                    if self.params.get_cfg { HandlerState::GetCfg } else { HandlerState::SetPrm }
+                }
+                (HandlerState::GetCfg, Answer::Data(_)) => HandlerState::SetPrm,
+                (HandlerState::SetPrm, Answer::Acknowledged) => HandlerState::ChkCfg,
+                (HandlerState::ChkCfg, Answer::Acknowledged) => HandlerState::AwaitReady,
+                (HandlerState::AwaitReady, Answer::Data(du)) => match self.diagnosis(du, out) {
+                    Some(status) => after_diagnosis(status),
+                    None => HandlerState::Diagnose,
+                },
+                (_, Answer::Nothing) => HandlerState::Diagnose,
+                _ => {
+                    out.observe(Observation::IllegalAnswer { slave: self.params.address });
+                    HandlerState::Diagnose
+                }
+            };
         self.enter(next, out);
         next == HandlerState::DataExchange
     }

@@ -308,14 +308,7 @@ impl Slave {
         }
     }
 
-    fn fail(
-        &mut self,
-        fault: DiagStatus,
-        cause: SlaveCause,
-        now: Local,
-        app: &mut impl Application,
-        out: &mut Outbox,
-    ) {
+    fn fail(&mut self, fault: DiagStatus, cause: SlaveCause, now: Local, app: &mut impl Application, out: &mut Outbox) {
         self.unlock(cause, now, app, out);
         self.fault = fault;
     }

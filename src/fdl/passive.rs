@@ -203,8 +203,8 @@ mod tests {
     #[test]
     fn a_repeated_request_gets_the_stored_reply_and_is_not_executed() {
         let mut station = Passive::new(SLAVE, BitRate::M12, Tbit(30));
-        let [first, odd, even] = [Fcb::First, Fcb::Alternate(false), Fcb::Alternate(true)]
-            .map(|fcb| request(MASTER, Service::SrdHigh, fcb));
+        let [first, odd, even] =
+            [Fcb::First, Fcb::Alternate(false), Fcb::Alternate(true)].map(|fcb| request(MASTER, Service::SrdHigh, fcb));
         assert_eq!(ask(&mut station, &first, 1), Some(1), "first request");
         assert_eq!(ask(&mut station, &even, 2), Some(1), "FCB = 1 again is a repeat of the first");
         assert_eq!(ask(&mut station, &odd, 3), Some(3), "toggled");

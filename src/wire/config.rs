@@ -20,7 +20,7 @@ rules! {
 /// What one identifier exchanges in one direction.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Part {
-    /// Length [octets].
+    /// Length (octets).
     pub octets: u8,
     /// Counted in words of two octets.
     pub words: bool,
@@ -81,23 +81,25 @@ impl<'a> Identifiers<'a> {
         self.octet += count;
         Some(taken)
     }
-    fn length(&mut self, follows: bool) -> Option<Option<Part>> {
-        if !follows {
-            return Some(None);
+    /// The length octet that `id` announces with one of its bits, if it does.
+    fn length(&mut self, octet: usize, id: u8, bit: u8) -> Result<Option<Part>, CfgError> {
+        if id & bit == 0 {
+            return Ok(None);
         }
-        let octet = *self.take(1)?.first()?;
-        Some(Some(Part::of_length_octet(octet)))
+        match self.take(1) {
+            Some(&[length]) => Ok(Some(Part::of_length_octet(length))),
+            _ => Err(CfgError::new(octet, CfgRule::LengthOctet, id)),
+        }
     }
     /// Bits 7..=6 say which lengths follow (outputs first), bits 3..=0 how many manufacturer octets.
     fn special(&mut self, octet: usize, id: u8) -> Result<Identifier<'a>, CfgError> {
-        let missing = |rule| move || CfgError::new(octet, rule, id);
-        let outputs = self.length(id & 0x80 != 0).ok_or_else(missing(CfgRule::LengthOctet))?;
-        let inputs = self.length(id & 0x40 != 0).ok_or_else(missing(CfgRule::LengthOctet))?;
+        let outputs = self.length(octet, id, 0x80)?;
+        let inputs = self.length(octet, id, 0x40)?;
         let count = match id & 0x0F {
             UNCHECKED => 0,
             count => usize::from(count),
         };
-        let manufacturer = self.take(count).ok_or_else(missing(CfgRule::Manufacturer))?;
+        let manufacturer = self.take(count).ok_or(CfgError::new(octet, CfgRule::Manufacturer, id))?;
         Ok(Identifier { outputs, inputs, manufacturer })
     }
 }

@@ -2,11 +2,12 @@
 //!
 //! [`Telegram`] is one telegram of the line with everything that a receiver checks already checked, [`Frame`] holds the
 //! octets of one. The other modules read and write what a data unit carries: [`prm`] and [`config`] during start-up,
-//! [`diag`] and [`control`] beside the cycle, [`drive`] in each cycle, [`acyclic`] in what is left of it.
+//! [`diag`] and [`control`] beside the cycle, [`drive`] in each cycle, [`acyclic`] and [`parameter`] in what is left of it.
 //!
 //! # Guarantees
 //! - No octets make a parser panic: what a remote station sends is data.
-//! - What a parser accepts and its emitter writes again is the same octets, except SD3, which leaves as SD2.
+//! - What a parser accepts and its emitter writes again is the same octets. Exceptions: SD3 leaves as SD2, a `Set_Prm` of
+//!   7 octets as one of 10, the padding of a parameter value as 0, a diagnosis without its extended blocks.
 //! - All integers in data units are big-endian.
 
 /// An enum of code numbers with their names in the standard's words: one line per code.

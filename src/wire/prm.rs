@@ -132,7 +132,7 @@ pub struct SetPrm<'a> {
     pub wd_fact_1: u8,
     /// Octet 3, second watchdog factor, 1..=255.
     pub wd_fact_2: u8,
-    /// Octet 4, earliest answer of the slave [`t_bit`]; 0 keeps the value in force.
+    /// Octet 4, earliest answer of the slave (`t_bit`); 0 keeps the value in force.
     pub min_tsdr: u8,
     /// Octets 5..=6, `Ident_Number`.
     pub ident: u16,
@@ -209,7 +209,7 @@ impl<'a> SetPrm<'a> {
     pub const fn watchdog_units(&self) -> Option<u16> {
         if self.status.wd_on() { Some(self.wd_fact_1 as u16 * self.wd_fact_2 as u16) } else { None }
     }
-    /// One watchdog step [ms]: 10, or 1 with [`DpV1Status::wd_base_1ms`].
+    /// One watchdog step (ms): 10, or 1 with [`DpV1Status::wd_base_1ms`].
     pub const fn watchdog_base_ms(&self) -> u16 {
         if self.dpv1.wd_base_1ms() { 1 } else { 10 }
     }
@@ -351,32 +351,32 @@ impl<'a> Iterator for Blocks<'a> {
 pub struct IsoM {
     /// Octet 36: 1.
     pub version: u8,
-    /// Octets 37..=40, `T_BASE_DP` [1/12 µs]; 1500 is the one every slave knows.
+    /// Octets 37..=40, `T_BASE_DP` (1/12 µs); 1500 is the one every slave knows.
     pub t_base_dp: u32,
-    /// Octets 41..=42, bus cycle `T_DP` [`T_BASE_DP`], 1..=65535.
+    /// Octets 41..=42, bus cycle `T_DP` (`T_BASE_DP`), 1..=65535.
     pub t_dp: u16,
-    /// Octet 43, master application cycle `T_MAPC` [`T_DP`], 1..=14.
+    /// Octet 43, master application cycle `T_MAPC` (`T_DP`), 1..=14.
     pub t_mapc: u8,
-    /// Octets 44..=47, `T_BASE_IO` [1/12 µs].
+    /// Octets 44..=47, `T_BASE_IO` (1/12 µs).
     pub t_base_io: u32,
-    /// Octets 48..=49, latch `T_I` before the end of the cycle [`T_BASE_IO`].
+    /// Octets 48..=49, latch `T_I` before the end of the cycle (`T_BASE_IO`).
     pub t_i: u16,
-    /// Octets 50..=51, set-point transfer `T_O` after the start of the cycle [`T_BASE_IO`].
+    /// Octets 50..=51, set-point transfer `T_O` after the start of the cycle (`T_BASE_IO`).
     pub t_o: u16,
-    /// Octets 52..=55, duration of all `Data_Exchange`, `T_DX` [1/12 µs]; a manual's "1/12 ms" is a misprint.
+    /// Octets 52..=55, duration of all `Data_Exchange`, `T_DX` (1/12 µs); a manual's "1/12 ms" is a misprint.
     pub t_dx: u32,
-    /// Octets 56..=57, half width of the clock window `T_PLL_W` [1/12 µs], 1..=65535.
+    /// Octets 56..=57, half width of the clock window `T_PLL_W` (1/12 µs), 1..=65535.
     pub t_pll_w: u16,
-    /// Octets 58..=59, delay of the clock `T_PLL_D` [1/12 µs].
+    /// Octets 58..=59, delay of the clock `T_PLL_D` (1/12 µs).
     pub t_pll_d: u16,
 }
 
 impl IsoM {
     /// Octets of the block, header included.
     pub const LEN: usize = 28;
-    /// The time bases that may be used [1/12 µs].
+    /// The time bases that may be used (1/12 µs).
     pub const TIME_BASES: [u32; 6] = [375, 750, 1500, 3000, 6000, 12000];
-    /// Shortest and longest bus cycle [1/12 µs]: 500 µs and 32 ms.
+    /// Shortest and longest bus cycle (1/12 µs): 500 µs and 32 ms.
     pub const T_DP_RANGE: core::ops::RangeInclusive<u64> = 6_000..=384_000;
 
     /// Reads the block.
@@ -447,15 +447,15 @@ impl IsoM {
         }
         Ok(())
     }
-    /// `T_DP` [1/12 µs].
+    /// `T_DP` (1/12 µs).
     pub const fn t_dp_units(&self) -> u64 {
         self.t_base_dp as u64 * self.t_dp as u64
     }
-    /// `T_I` [1/12 µs].
+    /// `T_I` (1/12 µs).
     pub const fn t_i_units(&self) -> u64 {
         self.t_base_io as u64 * self.t_i as u64
     }
-    /// `T_O` [1/12 µs].
+    /// `T_O` (1/12 µs).
     pub const fn t_o_units(&self) -> u64 {
         self.t_base_io as u64 * self.t_o as u64
     }
@@ -478,9 +478,9 @@ bits! {
 pub struct UserPrm81 {
     /// Octet 15.
     pub options: EncoderOptions,
-    /// Octets 16..=19, measuring units per revolution [counts].
+    /// Octets 16..=19, measuring units per revolution (counts).
     pub units_per_revolution: u32,
-    /// Octets 20..=23, total measuring range [counts].
+    /// Octets 20..=23, total measuring range (counts).
     pub total_range: u32,
     /// Octet 24, tolerated failures of the master's sign of life, default 1.
     pub max_failures: u8,
@@ -529,11 +529,11 @@ impl UserPrm81 {
 pub struct DxbLink {
     /// Address of the publisher, 0..=125.
     pub publisher: u8,
-    /// Length of the publisher's data [octets], 1..=244; a broadcast of another length is a link error.
+    /// Length of the publisher's data (octets), 1..=244; a broadcast of another length is a link error.
     pub length: u8,
-    /// Where the sample begins in the publisher's data [octets].
+    /// Where the sample begins in the publisher's data (octets).
     pub offset: u8,
-    /// Length of the sample [octets].
+    /// Length of the sample (octets).
     pub sample: u8,
 }
 
@@ -542,7 +542,7 @@ impl DxbLink {
     pub const LEN: usize = 4;
 
     /// Compares with the rules; `octet` is the number of the entry's first octet, `buffer` the largest sample that the
-    /// subscriber takes [octets].
+    /// subscriber takes (octets).
     ///
     /// # Errors
     /// The first rule broken.
@@ -550,7 +550,7 @@ impl DxbLink {
         self.check_at([octet, octet + 1, octet + 2, octet + 3], buffer)
     }
     /// As [`DxbLink::check`] with the octet number of each field.
-    fn check_at(&self, octets: [usize; 4], buffer: u8) -> Result<(), PrmError> {
+    fn check_at(self, octets: [usize; 4], buffer: u8) -> Result<(), PrmError> {
         let [publisher, length, offset, sample] = octets;
         let end = u16::from(self.offset) + u16::from(self.sample);
         if self.publisher > PUBLISHER_MAX {
@@ -607,7 +607,7 @@ pub struct DxbSubscription {
     pub link: DxbLink,
     /// Slot that the sample goes to.
     pub slot: u8,
-    /// Where it begins in this slot's data area [octets].
+    /// Where it begins in this slot's data area (octets).
     pub destination: u8,
 }
 impl DxbSubscription {
