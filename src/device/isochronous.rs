@@ -12,11 +12,11 @@
 //! | any | end of data exchange | Configuration |
 
 use crate::device::pll::{Change, Judgement, Pll, PllSettings};
+use crate::device::sensor::Fault;
 use crate::device::sign_of_life::{Counter, Monitor, MonitorSettings, Verdict};
 use crate::fdl::{Outbox, Timer};
 use crate::observation::{ClockVerdict, LifeState, Observation, Phase, PllState};
 use crate::time::{Local, Span};
-use crate::wire::drive::SensorFault;
 use crate::wire::prm::IsoM;
 
 /// What the isochronous part is told by the parameters.
@@ -120,18 +120,18 @@ impl Isochronous {
     }
 
     /// SYNCH arrived. Returns the fault that this makes.
-    pub fn synch(&mut self, now: Local, out: &mut Outbox) -> Option<SensorFault> {
+    pub fn synch(&mut self, now: Local, out: &mut Outbox) -> Option<Fault> {
         let before = self.pll.state();
         let judgement = self.pll.synch(now)?;
         self.judged(before, judgement, out)
     }
     /// [`Timer::Window`] came due. Returns the fault that this makes.
-    pub fn window_closed(&mut self, now: Local, out: &mut Outbox) -> Option<SensorFault> {
+    pub fn window_closed(&mut self, now: Local, out: &mut Outbox) -> Option<Fault> {
         let before = self.pll.state();
         let judgement = self.pll.window_closed(now)?;
         self.judged(before, judgement, out)
     }
-    fn judged(&mut self, before: PllState, judgement: Judgement, out: &mut Outbox) -> Option<SensorFault> {
+    fn judged(&mut self, before: PllState, judgement: Judgement, out: &mut Outbox) -> Option<Fault> {
         out.observe(Observation::Clock {
             verdict: judgement.verdict,
             error: judgement.error,
@@ -151,7 +151,7 @@ impl Isochronous {
             }
             Change::Lost => {
                 self.lost(out);
-                return Some(SensorFault::Clock);
+                return Some(Fault::Clock);
             }
             Change::None | Change::Restarted => {}
         }
@@ -180,7 +180,7 @@ impl Isochronous {
     }
 
     /// T_O: compares the master's sign of life. Returns the fault that this makes.
-    pub fn set_point(&mut self, mls: u8, out: &mut Outbox) -> Option<SensorFault> {
+    pub fn set_point(&mut self, mls: u8, out: &mut Outbox) -> Option<Fault> {
         let before = self.life.state();
         let step = self.life.cycle(mls);
         let sls = self.own.cycle(self.life.is_synchronised()).value();
@@ -199,7 +199,7 @@ impl Isochronous {
             },
             out,
         );
-        step.tripped.then_some(SensorFault::LifeSign)
+        step.tripped.then_some(Fault::MasterLife)
     }
 
     fn enter_phase(&mut self, to: Phase, out: &mut Outbox) {

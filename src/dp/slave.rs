@@ -21,6 +21,8 @@
 //!
 //! Source: EN 50170-2. The slave belongs to one device, whose own rules come in through [`Application`].
 
+use core::fmt;
+
 use crate::fdl::passive::{Indication, Passive};
 use crate::fdl::{Filter, Heard, Outbox, Timer};
 use crate::observation::{Observation, SlaveCause, SlaveState};
@@ -33,13 +35,44 @@ use crate::wire::{Address, Header, Sap, Status};
 /// Most output octets of a slave.
 const MAX_OUTPUTS: usize = 244;
 
+/// Why a slave does not take its parameters.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Refusal {
+    /// The telegram itself is wrong.
+    Telegram(PrmError),
+    /// The device cannot do what is asked for.
+    Device {
+        /// Octet of Set_Prm, from 1.
+        octet: usize,
+        /// The rule, as the second half of a sentence.
+        rule: &'static str,
+        /// The value found.
+        value: u64,
+    },
+}
+
+impl From<PrmError> for Refusal {
+    fn from(error: PrmError) -> Self {
+        Self::Telegram(error)
+    }
+}
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Telegram(error) => error.fmt(f),
+            Self::Device { octet, rule, value } => write!(f, "octet {octet} is {value}, but {rule}"),
+        }
+    }
+}
+impl core::error::Error for Refusal {}
+
 /// What a device brings along as a DP slave.
 pub trait Application {
     /// Checks the device's own rules for Set_Prm (blocks, times). Keeps nothing yet.
     ///
     /// # Errors
     /// The rule that is broken; the slave then reports Prm_Fault.
-    fn check(&self, prm: &SetPrm<'_>) -> Result<(), PrmError>;
+    fn check(&self, prm: &SetPrm<'_>) -> Result<(), Refusal>;
     /// Takes parameters over that were found good.
     fn parameterise(&mut self, prm: &SetPrm<'_>);
     /// Data exchange begins.

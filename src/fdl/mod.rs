@@ -50,6 +50,20 @@ pub enum Input<'a, C> {
     Command(C),
 }
 
+impl<'a, C> Input<'a, C> {
+    /// The same input with its command translated; none where the command has no translation.
+    pub fn map_command<D>(self, translate: impl FnOnce(C) -> Option<D>) -> Option<Input<'a, D>> {
+        Some(match self {
+            Self::PowerOn => Input::PowerOn,
+            Self::Telegram(heard) => Input::Telegram(heard),
+            Self::Sent => Input::Sent,
+            Self::Deadline { timer, busy } => Input::Deadline { timer, busy },
+            Self::Sample(raw) => Input::Sample(raw),
+            Self::Command(command) => Input::Command(translate(command)?),
+        })
+    }
+}
+
 /// A telegram as it arrived.
 #[derive(Clone, Copy, Debug)]
 pub struct Heard<'a> {

@@ -60,10 +60,8 @@ pub enum Until {
     Cycle(u64),
 }
 
-/// Deadlines of a station: the timers and the asked sample.
+/// Deadlines of a station: the timers, and the asked sample behind them.
 const DEADLINES: usize = Timer::ALL.len() + 1;
-/// Place of the sample among the deadlines.
-const SAMPLE: usize = Timer::ALL.len();
 
 /// A deadline. Only one event of it counts at a time; arming it later than that event costs nothing until it comes.
 #[derive(Clone, Copy, Debug, Default)]

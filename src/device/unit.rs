@@ -1,0 +1,317 @@
+//! A unit: a complete isochronous slave, from the telegram on the line to the word in telegram 81.
+//!
+//! It joins the DP slave, the isochronous part and the sensor handshake with a [`Function`], which is all that an
+//! encoder and a drive do not share. Before the clock is locked the unit runs freely: each Data_Exchange request
+//! is answered with the position at this request. After lock, T_O takes the control words over and T_I latches what
+//! the next request will find (Model: D8, D10).
+
+use crate::device::isochronous::{IsoSettings, Isochronous};
+use crate::device::profile::Profile;
+use crate::device::sensor::{Answer, Fault, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
+use crate::dp::slave::{Application, Identity, Refusal, Slave};
+use crate::fdl::{Filter, Input, Outbox, Station, Timer};
+use crate::observation::{self, Observation, Phase, SlaveState};
+use crate::time::{BitRate, Local, Span, Tbit};
+use crate::wire::Address;
+use crate::wire::drive::{G1Zsw, Inputs81, Outputs81, Zsw2};
+use crate::wire::prm::{Block, BlockType, IsoM, SetPrm};
+
+/// What one kind of unit does and another does not.
+pub trait Function {
+    /// Checks the blocks of Set_Prm that are the device's own; the isochronous block is not among them.
+    ///
+    /// # Errors
+    /// The rule that is broken.
+    fn check(&self, prm: &SetPrm<'_>) -> Result<(), Refusal>;
+    /// Takes parameters over that were found good. `watchdog` is none while it is off.
+    fn parameterise(&mut self, prm: &SetPrm<'_>, watchdog: Option<Span>);
+    /// Tolerated failures of the master's sign of life that these parameters ask for (manual 3.2.5).
+    fn max_failures(prm: &SetPrm<'_>) -> u8;
+    /// Whether these parameters switch on what takes the longer computing time (manual 3.2.2).
+    fn slow(prm: &SetPrm<'_>) -> bool;
+    /// G1_XIST1 and the right-justified position for G1_XIST2 at this raw position [steps].
+    fn position(&self, raw: u32) -> (u32, u32);
+    /// Sets the position (manual 2.2, G1_STW bits 11 and 12) at this raw position.
+    fn preset(&mut self, preset: Preset, raw: u32);
+    /// T_O came.
+    fn set_point(&mut self, _now: Local, _out: &mut Outbox) {}
+    /// A publisher's reply was heard.
+    fn published(&mut self, _now: Local, _publisher: Address, _du: &[u8], _out: &mut Outbox) {}
+    /// Publishers to listen to: bit n is address n.
+    fn publishers(&self) -> u128 {
+        0
+    }
+    /// Data exchange is over.
+    fn leave(&mut self, _out: &mut Outbox) {}
+}
+
+/// What is set at a unit, not by its master.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct UnitSettings {
+    /// Station address.
+    pub address: Address,
+    /// Bit rate of the bus.
+    pub rate: BitRate,
+    /// Own T_SDR (Model: D2).
+    pub t_sdr: Tbit,
+    /// Tolerated clock failures (Model: D15).
+    pub clock_tolerance: u8,
+}
+
+/// A complete isochronous slave.
+#[derive(Clone, Debug)]
+pub struct Unit<F> {
+    slave: Slave,
+    body: Body<F>,
+}
+
+/// The unit behind its DP slave.
+#[derive(Clone, Debug)]
+struct Body<F> {
+    profile: &'static Profile,
+    clock_tolerance: u8,
+    iso: Option<Isochronous>,
+    sensor: Sensor,
+    function: F,
+    outputs: Outputs81,
+    /// Raw position of the last latch, for a preset.
+    raw: u32,
+    /// Faults that the handshake has not seen yet.
+    causes: Faults,
+    /// What the handshake says, until its next cycle.
+    answer: Answer,
+    /// What the next request will find.
+    inputs: Inputs81,
+}
+
+impl<F: Function> Unit<F> {
+    /// A unit of this kind without supply.
+    pub fn new(profile: &'static Profile, settings: UnitSettings, function: F) -> Self {
+        let identity = Identity {
+            address: settings.address,
+            ident: profile.ident,
+            config: profile.config,
+            outputs: profile.outputs,
+            inputs: profile.inputs,
+            fail_safe: profile.fail_safe,
+            publisher: profile.publisher,
+            rate: settings.rate,
+            t_sdr: settings.t_sdr,
+        };
+        let body = Body {
+            profile,
+            clock_tolerance: settings.clock_tolerance,
+            iso: None,
+            sensor: Sensor::new(SensorOptions::default()),
+            function,
+            outputs: Outputs81::default(),
+            raw: 0,
+            causes: Faults::NONE,
+            answer: Answer::NONE,
+            inputs: Inputs81::default(),
+        };
+        Self { slave: Slave::new(identity), body }
+    }
+    /// The DP slave.
+    pub const fn slave(&self) -> &Slave {
+        &self.slave
+    }
+    /// Start-up phase now.
+    pub fn phase(&self) -> Phase {
+        self.body.iso.as_ref().map_or(Phase::Configuration, Isochronous::phase)
+    }
+    /// What the next request will find.
+    pub const fn inputs(&self) -> &Inputs81 {
+        &self.body.inputs
+    }
+}
+
+impl<F: Function> Body<F> {
+    fn reset(&mut self, out: &mut Outbox) {
+        if let Some(mut iso) = self.iso.take() {
+            iso.leave(out);
+        }
+        self.sensor = Sensor::new(SensorOptions::default());
+        self.causes = Faults::NONE;
+        self.answer = Answer::NONE;
+        self.outputs = Outputs81::default();
+        self.inputs = Inputs81::default();
+    }
+
+    /// The control words take effect: at T_O, or with each request while the clock is not locked.
+    fn take_over(&mut self, out: &mut Outbox) {
+        let causes = core::mem::take(&mut self.causes);
+        self.answer = self.sensor.cycle(self.outputs.g1_stw.0, causes);
+        if let Some(preset) = self.answer.preset {
+            self.function.preset(preset, self.raw);
+        }
+        for fault in self.answer.latched.iter() {
+            out.observe(Observation::Fault { code: fault.code() });
+        }
+        if let Some(fault) = self.answer.cleared {
+            out.observe(Observation::Acknowledged { code: fault.code() });
+        }
+    }
+    /// Keeps a fault for the next cycle of the handshake.
+    fn raise(&mut self, fault: Option<Fault>) {
+        if let Some(fault) = fault {
+            self.causes = self.causes.with(fault);
+        }
+    }
+    /// Takes the position for the next reply.
+    fn latch(&mut self, raw: u32, locked: bool, out: &mut Outbox) {
+        self.raw = raw;
+        let (xist1, position) = self.function.position(raw);
+        let sls = self.iso.as_ref().map_or(0, Isochronous::own_sign);
+        self.inputs = Inputs81 {
+            zsw2: Zsw2(u16::from(sls) << 12),
+            g1_zsw: G1Zsw(self.answer.zsw),
+            xist1: if self.answer.xist1 == Xist1::Position { xist1 } else { 0 },
+            xist2: match self.answer.xist2 {
+                Xist2::Zero => 0,
+                Xist2::Position => position,
+                Xist2::Code(code) => code.into(),
+            },
+        };
+        let Inputs81 { zsw2, g1_zsw, xist1, xist2 } = self.inputs;
+        let inputs = observation::Inputs { zsw2: zsw2.0, g1_zsw: g1_zsw.0, xist1, xist2 };
+        out.observe(Observation::Latch { locked, inputs });
+    }
+    fn window_closed(&mut self, now: Local, out: &mut Outbox) {
+        let fault = self.iso.as_mut().and_then(|iso| iso.window_closed(now, out));
+        self.raise(fault);
+    }
+    fn set_point(&mut self, now: Local, out: &mut Outbox) {
+        let mls = (self.outputs.stw2.0 >> 12) as u8;
+        let fault = self.iso.as_mut().and_then(|iso| iso.set_point(mls, out));
+        self.raise(fault);
+        self.take_over(out);
+        self.function.set_point(now, out);
+    }
+    fn is_locked(&self) -> bool {
+        self.iso.as_ref().is_some_and(Isochronous::is_locked)
+    }
+
+    /// The rules of the isochronous block (Model: D3, manual 3.3).
+    fn check_iso(&self, block: &Block<'_>, slow: bool) -> Result<(), Refusal> {
+        let iso = IsoM::parse(block)?;
+        iso.check(block.octet)?;
+        let units = |span: Span| (span.ticks() / Span::TICKS_PER_ISO_UNIT) as u64;
+        let (t_dp, t_i, t_o, t_dx) = (iso.t_dp_units(), iso.t_i_units(), iso.t_o_units(), u64::from(iso.t_dx));
+        let gap = units(self.profile.gap_min(slow));
+        let range = units(self.profile.t_dp_min)..=units(self.profile.t_dp_max);
+        let rules = [
+            (9, t_dp, range.contains(&t_dp), "T_DP [1/12 us] is within the device's range (manual 3.3.2)"),
+            (16, t_i, t_i >= units(self.profile.t_i_min(slow)), "T_I [1/12 us] is 125 us or more, 375 us with octet 15 bit 1 (manual 3.3.5)"),
+            (16, t_i, t_i < t_dp, "T_I [1/12 us] is less than T_DP (manual 3.3.5)"),
+            (18, t_o, t_o > t_dx + units(self.profile.t_o_min), "T_O [1/12 us] is more than T_DX + T_O_MIN (manual 3.3.6)"),
+            (18, t_o, t_o < t_dp, "T_O [1/12 us] is less than T_DP (Model: D3)"),
+            (18, t_o, t_o + t_i + gap <= t_dp, "T_O [1/12 us] is 125 us or more before the latch, 375 us with octet 15 bit 1 (manual 3.3.6)"),
+            (24, u64::from(iso.t_pll_w), iso.t_pll_w <= self.profile.t_pll_w_max, "T_PLL_W [1/12 us] is not above T_PLL_W_MAX (GSD)"),
+        ];
+        match rules.into_iter().find(|&(.., good, _)| !good) {
+            Some((offset, value, _, rule)) => Err(Refusal::Device { octet: block.octet + offset, rule, value }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The isochronous block, where there is one.
+fn iso_block<'a>(prm: &SetPrm<'a>) -> Result<Option<Block<'a>>, Refusal> {
+    let mut found = None;
+    for block in prm.blocks() {
+        let block = block?;
+        if block.kind == BlockType::IsoM && found.replace(block).is_some() {
+            let rule = "there is one isochronous block at most (manual 3.3)";
+            return Err(Refusal::Device { octet: block.octet, rule, value: u64::from(block.kind.code()) });
+        }
+    }
+    Ok(found)
+}
+
+impl<F: Function> Application for Body<F> {
+    fn check(&self, prm: &SetPrm<'_>) -> Result<(), Refusal> {
+        self.function.check(prm)?;
+        match iso_block(prm)? {
+            Some(block) => self.check_iso(&block, F::slow(prm)),
+            None if prm.dpv1.isom_req() => {
+                let rule = "IsoM_Req needs an isochronous block (manual 3.1)";
+                Err(Refusal::Device { octet: 10, rule, value: prm.dpv1.octets()[2].into() })
+            }
+            None => Ok(()),
+        }
+    }
+    fn parameterise(&mut self, prm: &SetPrm<'_>) {
+        let watchdog = prm.watchdog_units().map(|n| Span::from_ms(i64::from(n) * i64::from(prm.watchdog_base_ms())));
+        let iso = iso_block(prm).ok().flatten().filter(|_| prm.dpv1.isom_req());
+        self.iso = iso.and_then(|block| IsoM::parse(&block).ok()).map(|iso| {
+            Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), self.clock_tolerance))
+        });
+        self.function.parameterise(prm, watchdog);
+    }
+    fn enter(&mut self, _now: Local, out: &mut Outbox) {
+        out.sample_with_telegrams(true);
+    }
+    fn leave(&mut self, _now: Local, out: &mut Outbox) {
+        self.reset(out);
+        out.sample_with_telegrams(false);
+        self.function.leave(out);
+    }
+    fn outputs(&mut self, _now: Local, outputs: Option<&[u8]>, sample: u32, out: &mut Outbox) {
+        // Clear: no sign of life, no command.
+        self.outputs = outputs.and_then(Outputs81::parse).unwrap_or_default();
+        if let Some(iso) = &mut self.iso {
+            iso.exchanged(out);
+        }
+        if !self.is_locked() {
+            self.take_over(out);
+            self.latch(sample, false, out);
+        }
+    }
+    fn inputs(&self, du: &mut [u8]) {
+        du.copy_from_slice(&self.inputs.emit());
+    }
+    fn synch(&mut self, now: Local, out: &mut Outbox) {
+        let fault = self.iso.as_mut().and_then(|iso| iso.synch(now, out));
+        self.raise(fault);
+    }
+    fn operate(&mut self, _now: Local, operate: bool, _out: &mut Outbox) {
+        if let Some(iso) = &mut self.iso {
+            iso.operate(operate);
+        }
+    }
+    fn published(&mut self, now: Local, publisher: Address, du: &[u8], out: &mut Outbox) {
+        self.function.published(now, publisher, du, out);
+    }
+    fn publishers(&self) -> u128 {
+        self.function.publishers()
+    }
+}
+
+impl<F: Function> Station for Unit<F> {
+    /// A unit takes no orders but from its master.
+    type Command = core::convert::Infallible;
+
+    fn address(&self) -> Address {
+        self.slave.identity().address
+    }
+    fn filter(&self) -> Filter {
+        self.slave.filter(&self.body)
+    }
+    fn step(&mut self, now: Local, input: Input<'_, Self::Command>, out: &mut Outbox) {
+        match input {
+            Input::PowerOn => {
+                self.body.reset(out);
+                self.body.function.leave(out);
+                self.slave.power_on(now, &mut self.body, out);
+            }
+            Input::Telegram(heard) => self.slave.heard(now, heard, &mut self.body, out),
+            Input::Deadline { timer: Timer::Watchdog, .. } => self.slave.watchdog(now, &mut self.body, out),
+            Input::Deadline { timer: Timer::Window, .. } => self.body.window_closed(now, out),
+            Input::Deadline { timer: Timer::SetPoint, .. } => self.body.set_point(now, out),
+            Input::Sample(raw) if self.slave.state() == SlaveState::DataExch => self.body.latch(raw, true, out),
+            Input::Deadline { .. } | Input::Sent | Input::Sample(_) => {}
+            Input::Command(never) => match never {},
+        }
+    }
+}
