@@ -9,19 +9,19 @@ use std::collections::{BinaryHeap, VecDeque};
 
 /// What kind of event comes first among events of one instant.
 ///
-/// The scenario speaks first, so that a command at an instant rules all of it. Then stations hear before they decide:
-/// a telegram that ends, or an edge that comes, exactly when a slot timer runs out counts as heard. Of these the
-/// telegram goes first, since its end precedes the start of another. What is sent comes last: it is the answer to
-/// everything that the instant brought.
+/// The scenario speaks first, so that a command at an instant rules all of it. A telegram's last bit leaves its sender
+/// before it arrives anywhere, also where no cable lies between. Stations hear before they decide: a telegram that ends
+/// exactly when a slot timer runs out counts as heard. What is sent comes last: it is the answer to everything that
+/// the instant brought.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[repr(u8)]
 pub enum Phase {
     /// A command of the scenario.
     Command,
+    /// The last bit of a telegram leaves its sender.
+    Edge,
     /// A telegram's last bit arrives at a station.
     Telegram,
-    /// The bus becomes busy or idle at a station.
-    Edge,
     /// A station's deadline comes due.
     Deadline,
     /// A station's first bit leaves.
@@ -30,7 +30,7 @@ pub enum Phase {
 
 impl Phase {
     /// Every phase, first to last.
-    pub const ALL: &'static [Self] = &[Self::Command, Self::Telegram, Self::Edge, Self::Deadline, Self::Send];
+    pub const ALL: &'static [Self] = &[Self::Command, Self::Edge, Self::Telegram, Self::Deadline, Self::Send];
 }
 
 /// An event's place in the order: time, phase, station, and the station's own number for it.
