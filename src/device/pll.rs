@@ -797,14 +797,13 @@ mod tests {
                     2..=5 => {
                         let near = pll.next_edge().map_or(now, Local::ticks);
                         let width = 2 * pll.window().ticks() + 1;
-                        _ = pll.synch(at(near - t_pll_d as i64 * 1_000 + value % width));
+                        _ = pll.synch(at(near - i64::from(t_pll_d) * 1_000 + value % width));
                     }
                     _ => _ = pll.window_end().map(|end| pll.window_closed(end)),
                 }
                 now = now.wrapping_add(value % 1_000_000_000).clamp(-(1 << 61), 1 << 61);
-                match (last, tracking, pll.edge()) {
-                    (Some(before), Some(_), Some(edge)) => prop_assert!(edge >= before, "{edge:?} after {before:?}"),
-                    _ => {}
+                if let (Some(before), Some(_), Some(edge)) = (last, tracking, pll.edge()) {
+                    prop_assert!(edge >= before, "{edge:?} after {before:?}");
                 }
                 last = pll.edge();
                 prop_assert!(pll.next_edge() >= pll.edge());
