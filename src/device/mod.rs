@@ -1,5 +1,7 @@
 //! The slave's application: what makes an encoder out of a DP slave. Machines on the station's own clock alone.
 
 pub mod pll;
+pub mod position;
 pub mod profile;
+pub mod sensor;
 pub mod sign_of_life;

@@ -24,6 +24,9 @@
 //! offset swings the error to 2.9 times its value per cycle about six cycles after the first SYNCH, which at 8 ms and
 //! 80 ppm is more than the window that is in force by then; starting from `T_DP` again would fail in every attempt.
 //! Loss of lock and an attempt without hit start from `T_DP` (D11).
+//!
+//! With the default gains the error is up to 1.14 times a periodic jitter and up to 2.55 times its bound in the worst
+//! sequence of all (sum of the impulse response's magnitudes): a jitter of ± 0.39 w never leaves the window.
 
 use crate::observation::{ClockVerdict, PllState};
 use crate::time::{Local, Span};

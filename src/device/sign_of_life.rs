@@ -467,11 +467,11 @@ mod tests {
                 let mut monitor = fed(MonitorSettings::new(2, 1), cycle - early);
                 assert_eq!(monitor.state(), state);
                 let step = match input {
-                    0 => monitor.cycle(good(cycle + 1, 2)),
+                    // Too short a hold: the next value although the present one is due once more.
+                    0 | 4 => monitor.cycle(good(cycle + 1, 2)),
                     1 => monitor.cycle(after(good(cycle + 1, 2), 1)),
                     2 => monitor.cycle(0),
                     3 => monitor.cycle(good(cycle, 2)),
-                    4 => monitor.cycle(good(cycle + 1, 2)),
                     _ => {
                         monitor.reset();
                         continue;
@@ -533,11 +533,10 @@ mod tests {
                 });
                 let age = all.len() - 1 - start;
                 begin = match (early, trip) {
-                    (Some(k), _) => k + 1,
                     (None, Some(k)) if k + 1 == all.len() => {
                         return Seen { state: LifeState::Waiting, failures, tripped: true };
                     }
-                    (None, Some(k)) => k + 1,
+                    (Some(k), _) | (None, Some(k)) => k + 1,
                     (None, None) => {
                         let state = match age {
                             _ if age < 16 * self.hold => LifeState::Strict,
