@@ -50,11 +50,11 @@ pub struct PllSettings {
     pub t_pll_d: Span,
     /// n1, multiple of `t_pll_w` in the first window. Model: D11, default 4.
     pub first_window_factor: u16,
-    /// n2, share of `t_dp` in the first window [ppm]. Model: D11, default 300.
+    /// n2, share of `t_dp` in the first window (ppm). Model: D11, default 300.
     pub first_window_ppm: u32,
-    /// Kp, proportional gain [1/65536], 0..=65536. Model: D11, default 1/4.
+    /// Kp, proportional gain (1/65536), 0..=65536. Model: D11, default 1/4.
     pub kp: u32,
-    /// Ki, integral gain [1/65536], 0..=65536. Model: D11, default 1/32.
+    /// Ki, integral gain (1/65536), 0..=65536. Model: D11, default 1/32.
     pub ki: u32,
     /// Hits in a row that halve the window. Model: D12, default 4.
     pub hits_per_step: u8,
@@ -136,7 +136,7 @@ impl Fine {
     fn half(self) -> Self {
         Self(self.0 / 2)
     }
-    /// This distance times a gain [1/65536].
+    /// This distance times a gain (1/65536).
     fn times(self, gain: u32) -> Self {
         Self((self.0 * i128::from(gain)) >> FRACTION_BITS)
     }

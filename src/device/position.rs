@@ -25,7 +25,7 @@ pub enum CodeSequence {
 pub struct Scaling {
     /// MUPR, measuring units per revolution, 1..=physical steps per revolution. Manual 3.2.3, octets 16-19.
     pub units_per_rev: u32,
-    /// TMR, total measuring range [units], 1..=MUPR · physical revolutions; the value runs from 0 to TMR − 1.
+    /// TMR, total measuring range (units), 1..=MUPR · physical revolutions; the value runs from 0 to TMR − 1.
     /// Manual 3.2.4, octets 20-23; Model: D20.
     pub total_range: u32,
 }
@@ -37,18 +37,18 @@ pub enum ScalingError {
     NoUnits,
     /// More units than physical steps per revolution: the code would not be single-stepped (manual 3.2.3).
     UnitsAboveSteps {
-        /// As parameterised [units].
+        /// As parameterised (units).
         units_per_rev: u32,
-        /// Physical resolution [steps].
+        /// Physical resolution (steps).
         steps_per_rev: u32,
     },
     /// No measuring range at all (manual 3.2.4).
     NoRange,
     /// A period longer than the physical revolutions (manual 3.2.4; Model: D20, equality is allowed).
     RangeAboveRevolutions {
-        /// As parameterised [units].
+        /// As parameterised (units).
         total_range: u32,
-        /// MUPR · physical revolutions [units].
+        /// MUPR · physical revolutions (units).
         limit: u64,
     },
 }
@@ -142,13 +142,13 @@ impl Position {
         Ok(Self { code_sequence, scaling, steps_per_rev, revolutions, offset: 0 })
     }
 
-    /// Position value [steps, or units when scaled], 0..[`Position::range`], for `raw` [steps]. A raw position beyond
+    /// Position value (steps, or units when scaled), 0..[`Position::range`], for `raw` (steps). A raw position beyond
     /// the disc wraps.
     pub fn value(&self, raw: u32) -> u32 {
         self.shifted(self.scaled(raw), self.offset)
     }
 
-    /// Number of different values [steps, or units when scaled], 1..=2^32.
+    /// Number of different values (steps, or units when scaled), 1..=2^32.
     pub fn range(&self) -> u64 {
         self.scaling.map_or_else(|| self.positions(), |scaling| scaling.total_range.into())
     }
@@ -172,7 +172,7 @@ impl Position {
         value
     }
 
-    /// Sets the home position: from now on `raw` [steps] reads `preset` [steps or units], modulo the range.
+    /// Sets the home position: from now on `raw` (steps) reads `preset` (steps or units), modulo the range.
     /// A negative preset is ignored. Manual 2.2, G1_STW bit 11 = 0.
     pub fn preset_absolute(&mut self, raw: u32, preset: i32) {
         if let Ok(preset) = u64::try_from(preset) {
@@ -181,14 +181,14 @@ impl Position {
         }
     }
 
-    /// Shifts the home position: every position reads `shift` [steps or units] more, modulo the range.
+    /// Shifts the home position: every position reads `shift` (steps or units) more, modulo the range.
     /// Manual 2.2, G1_STW bit 11 = 1.
     pub fn preset_relative(&mut self, shift: i32) {
         let shift = i64::from(shift).rem_euclid(self.range() as i64);
         self.offset = self.shifted(self.offset, shift as u32);
     }
 
-    /// Offset in force [steps, or units when scaled].
+    /// Offset in force (steps, or units when scaled).
     pub fn offset(&self) -> u32 {
         self.offset
     }
