@@ -286,3 +286,330 @@ impl Counter {
         self.sign
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec;
+    use alloc::vec::Vec;
+
+    fn after(sign: u8, steps: usize) -> u8 {
+        (0..steps).fold(LifeSign::new(sign), |sign, _| sign.next()).value()
+    }
+    /// The value of an error-free master in DP cycle `k` after its start value 1.
+    fn good(k: usize, hold: u8) -> u8 {
+        after(1, k / usize::from(hold))
+    }
+    /// A monitor fed with an error-free master up to and including DP cycle `until` after the start value.
+    fn fed(settings: MonitorSettings, until: usize) -> Monitor {
+        let mut monitor = Monitor::new(settings);
+        monitor.cycle(0);
+        (0..=until).for_each(|k| _ = monitor.cycle(good(k, settings.hold)));
+        monitor
+    }
+    /// A monitor in operation with an empty counter whose last accepted value is 5, in the last cycle of its hold time.
+    fn operating(hold: u8, tolerance: u16) -> Monitor {
+        let monitor = fed(MonitorSettings::new(hold, tolerance), usize::from(hold) * 35 - 1);
+        assert_eq!((monitor.state(), good(usize::from(hold) * 35 - 1, hold)), (LifeState::Operating, 5));
+        monitor
+    }
+    fn counters(monitor: &mut Monitor, received: &[u8]) -> Vec<u32> {
+        let counter = |&value: &u8| {
+            monitor.cycle(value);
+            monitor.failures()
+        };
+        received.iter().map(counter).collect()
+    }
+
+    #[test]
+    fn the_sign_of_life_counts_from_1_to_15_and_leaves_0_out() {
+        let signs: Vec<u8> = (0..17).map(|k| after(0, k)).collect();
+        assert_eq!(signs, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 1]);
+        assert_eq!(LifeSign::from_word(0xB7FF).to_word(), 0xB000);
+    }
+
+    #[test]
+    fn synchronising_takes_16_steps_and_16_cycles() {
+        // V13: own sign 1 at cycle 16·n, operation at cycle 16·n + 16.
+        for hold in 1..=14 {
+            let n = usize::from(hold);
+            let (mut monitor, mut own) = (Monitor::new(MonitorSettings::new(hold, 1)), Counter::new());
+            monitor.cycle(0);
+            for k in 0..400 {
+                let step = monitor.cycle(good(k, hold));
+                let sign = own.cycle(monitor.is_synchronised()).value();
+                let expected = if k < 16 * n { 0 } else { after(1, k - 16 * n) };
+                assert_eq!(sign, expected, "n {n} cycle {k}");
+                let entered = match k {
+                    0 => Some(LifeState::Strict),
+                    _ if k == 16 * n => Some(LifeState::Confirming),
+                    _ if k == 16 * n + 16 => Some(LifeState::Operating),
+                    _ => None,
+                };
+                assert_eq!(step.entered, entered, "n {n} cycle {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn traversal_and_confirmation_are_settings() {
+        for (steps, confirmation) in [(15, 16), (1, 1), (16, 0), (255, 255)] {
+            let settings = MonitorSettings { steps, confirmation, ..MonitorSettings::new(3, 1) };
+            let (traversal, all) = (3 * usize::from(steps), 3 * usize::from(steps) + usize::from(confirmation));
+            assert!(!fed(settings, traversal - 1).is_synchronised());
+            assert!(fed(settings, traversal).is_synchronised());
+            assert_ne!(fed(settings, all - 1).state(), LifeState::Operating);
+            assert_eq!(fed(settings, all).state(), LifeState::Operating);
+        }
+    }
+
+    #[test]
+    fn only_a_change_to_a_new_value_starts() {
+        let mut monitor = Monitor::new(MonitorSettings::new(1, 1));
+        for value in [7, 7, 7, 0, 0] {
+            assert_eq!(monitor.cycle(value).verdict, Verdict::Unused, "{value}");
+        }
+        assert_eq!(monitor.cycle(7).verdict, Verdict::Start);
+        monitor.reset();
+        assert_eq!(monitor.cycle(8).verdict, Verdict::Unused, "nothing known after a reset");
+        assert_eq!(monitor.cycle(9).verdict, Verdict::Start);
+    }
+
+    #[test]
+    fn table_a_one_stale_value_is_one_failure() {
+        let mut monitor = operating(1, 1);
+        let received = [6, 6, 8, 9, 10, 11, 12, 13, 14, 15, 1, 2, 3];
+        assert_eq!(counters(&mut monitor, &received), [0, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0, 0]);
+        assert_eq!(monitor.state(), LifeState::Operating);
+    }
+
+    #[test]
+    fn table_b_two_stale_values_in_a_row_trip() {
+        let (mut monitor, mut own) = (operating(1, 1), Counter::new());
+        own.cycle(true);
+        assert_eq!(counters(&mut monitor, &[6, 6]), [0, 10]);
+        let step = monitor.cycle(6);
+        assert!(step.tripped);
+        assert_eq!((step.entered, monitor.failures()), (Some(LifeState::Waiting), 20));
+        assert_eq!(own.cycle(monitor.is_synchronised()), LifeSign::INVALID, "0 in the cycle of the trip");
+        let step = monitor.cycle(9);
+        assert_eq!((step.verdict, step.tripped, monitor.failures()), (Verdict::Start, false, 0));
+        assert!((10..=15).chain(1..=9).all(|value| monitor.cycle(value).verdict == Verdict::Right));
+        assert_eq!(monitor.cycle(10).entered, Some(LifeState::Confirming));
+    }
+
+    #[test]
+    fn table_e_ten_good_values_repay_a_failure() {
+        let mut monitor = operating(1, 1);
+        let received = [6, 6, 8, 9, 10, 11, 12, 13, 14, 15, 1, 2, 2, 4];
+        assert_eq!(counters(&mut monitor, &received), [0, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0, 10, 9]);
+        let mut monitor = operating(1, 1);
+        let received = [6, 6, 8, 9, 10, 11, 12, 13, 14, 15, 1, 1];
+        assert_eq!(counters(&mut monitor, &received)[11], 11, "nine are one too few");
+        assert_eq!(monitor.state(), LifeState::Waiting);
+    }
+
+    #[test]
+    fn the_failure_counter_is_ten_per_failure_against_ten_per_tolerated_one() {
+        // V12: the tolerance is the number of failures back to back that survive.
+        for tolerance in [0, 1, 2, 4, 10, 255, 1_000] {
+            let mut monitor = operating(1, tolerance);
+            for k in 1..=u32::from(tolerance) {
+                assert!(!monitor.cycle(0).tripped, "0 is a failure like any other");
+                assert_eq!(monitor.failures(), 10 * k);
+            }
+            assert!(monitor.cycle(0).tripped, "tolerance {tolerance}");
+        }
+        let mut monitor = operating(1, MonitorSettings::OFF);
+        assert!((0..70_000).all(|_| !monitor.cycle(0).tripped), "P925 = 65535 switches the monitoring off");
+    }
+
+    #[test]
+    fn the_expectation_runs_freely_and_is_never_rebased() {
+        // A master that lost a step is wrong from then on.
+        let mut monitor = operating(1, 4);
+        assert_eq!(counters(&mut monitor, &[6, 7, 9, 10, 11, 12]), [0, 0, 10, 20, 30, 40]);
+        assert!(monitor.cycle(13).tripped);
+        // A single jump that returns is one failure.
+        let mut monitor = operating(1, 1);
+        assert_eq!(counters(&mut monitor, &[6, 12, 8, 9]), [0, 10, 9, 8]);
+    }
+
+    #[test]
+    fn an_error_counts_at_every_position_of_a_held_value() {
+        for position in 0..2 {
+            let mut monitor = operating(2, 1);
+            let mut received = vec![6, 6, 7, 7, 8, 8];
+            received[2 + position] = 3;
+            let mut expected = vec![0, 0, 0, 0, 0, 0];
+            (2 + position..6).zip([10, 9, 8, 7]).for_each(|(k, counter)| expected[k] = counter);
+            assert_eq!(counters(&mut monitor, &received), expected, "position {position}");
+            // Before operation the same error starts over.
+            let mut monitor = fed(MonitorSettings::new(2, 1), 9 + position);
+            assert_eq!(monitor.cycle(14).entered, Some(LifeState::Waiting), "position {position}");
+        }
+    }
+
+    #[test]
+    fn every_state_answers_every_input() {
+        use LifeState::{Confirming, Operating, Strict, Waiting};
+        // Cycles since the start value at n = 2: right value, wrong value, 0, too long a hold, too short a hold, reset.
+        let table = [
+            (Strict, 11, [Strict, Waiting, Waiting, Waiting, Waiting, Waiting]),
+            (Strict, 31, [Confirming, Waiting, Waiting, Waiting, Waiting, Waiting]),
+            (Confirming, 39, [Confirming, Waiting, Waiting, Waiting, Waiting, Waiting]),
+            (Confirming, 47, [Operating, Waiting, Waiting, Waiting, Waiting, Waiting]),
+            (Operating, 49, [Operating, Operating, Operating, Operating, Operating, Waiting]),
+        ];
+        for (state, cycle, next) in table {
+            for (input, expected) in next.into_iter().enumerate() {
+                let early = usize::from(input == 4);
+                let mut monitor = fed(MonitorSettings::new(2, 1), cycle - early);
+                assert_eq!(monitor.state(), state);
+                let step = match input {
+                    // Too short a hold: the next value although the present one is due once more.
+                    0 | 4 => monitor.cycle(good(cycle + 1, 2)),
+                    1 => monitor.cycle(after(good(cycle + 1, 2), 1)),
+                    2 => monitor.cycle(0),
+                    3 => monitor.cycle(good(cycle, 2)),
+                    _ => {
+                        monitor.reset();
+                        continue;
+                    }
+                };
+                assert_eq!(monitor.state(), expected, "{state} after {cycle}, input {input}");
+                assert!(!step.tripped, "no fault before operation, none within the tolerance");
+                assert_eq!(step.entered, (expected != state).then_some(expected));
+            }
+        }
+    }
+
+    #[test]
+    fn a_value_held_for_more_than_14_cycles_never_synchronises() {
+        for hold in 1..=14 {
+            let mut monitor = Monitor::new(MonitorSettings::new(hold, 1));
+            let states: Vec<_> = (0..600)
+                .map(|k| {
+                    monitor.cycle(after(1, k / 15));
+                    monitor.state()
+                })
+                .collect();
+            assert!(states.iter().all(|&state| matches!(state, LifeState::Waiting | LifeState::Strict)), "{hold}");
+        }
+    }
+
+    /// The same rules decided from the whole history in every cycle: nothing is remembered but what was received.
+    struct History {
+        received: Vec<u8>,
+        hold: usize,
+        tolerance: u32,
+    }
+    #[derive(PartialEq, Debug)]
+    struct Seen {
+        state: LifeState,
+        failures: u32,
+        tripped: bool,
+    }
+    impl History {
+        /// Value that must come `age` cycles after the start value `first`: position in the ring of fifteen.
+        fn due(&self, first: u8, age: usize) -> u8 {
+            ((usize::from(first) - 1 + age / self.hold) % 15) as u8 + 1
+        }
+        fn decide(&self) -> Seen {
+            let (all, mut failures) = (&self.received, 0);
+            let mut begin = 1;
+            loop {
+                let Some(start) = (begin..all.len()).find(|&k| all[k] != 0 && all[k] != all[k - 1]) else {
+                    return Seen { state: LifeState::Waiting, failures, tripped: false };
+                };
+                let wrong = |k: &usize| all[*k] != self.due(all[start], *k - start);
+                let strict_until = start + 16 * self.hold + 16;
+                let early = (start..all.len().min(strict_until + 1)).find(wrong);
+                // Tolerant part: sum with a floor, up to the trip.
+                failures = 0;
+                let trip = (strict_until + 1..all.len()).filter(|_| early.is_none()).find(|k| {
+                    failures = if wrong(k) { failures + 10 } else { u32::saturating_sub(failures, 1) };
+                    wrong(k) && failures > 10 * self.tolerance
+                });
+                let age = all.len() - 1 - start;
+                begin = match (early, trip) {
+                    (None, Some(k)) if k + 1 == all.len() => {
+                        return Seen { state: LifeState::Waiting, failures, tripped: true };
+                    }
+                    (Some(k), _) | (None, Some(k)) => k + 1,
+                    (None, None) => {
+                        let state = match age {
+                            _ if age < 16 * self.hold => LifeState::Strict,
+                            _ if age < 16 * self.hold + 16 => LifeState::Confirming,
+                            _ => LifeState::Operating,
+                        };
+                        return Seen { state, failures, tripped: false };
+                    }
+                };
+            }
+        }
+    }
+
+    /// A small reproducible source of choices.
+    struct Lcg(u64);
+    impl Lcg {
+        fn below(&mut self, bound: u64) -> u64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 33) % bound
+        }
+    }
+
+    /// A mostly correct stream: stale values, wrong ones, zeros, lost and doubled cycles, restarts of the master.
+    fn stream(random: &mut Lcg, hold: u8, length: usize) -> Vec<u8> {
+        let mut received = vec![random.below(16) as u8];
+        let (mut sign, mut age) = (LifeSign::new(random.below(16) as u8), 0);
+        let rate = [15, 60, 400, 5_000][random.below(4) as usize];
+        while received.len() < length {
+            age += 1;
+            if age >= hold {
+                (sign, age) = (sign.next(), 0);
+            }
+            received.push(match random.below(rate) {
+                0 => received[received.len() - 1],
+                1 => random.below(16) as u8,
+                2 => 0,
+                3 => {
+                    sign = LifeSign::new(random.below(16) as u8);
+                    sign.value()
+                }
+                4 => {
+                    age += 1;
+                    sign.value()
+                }
+                _ => sign.value(),
+            });
+        }
+        received
+    }
+
+    #[test]
+    fn the_monitor_agrees_with_a_decision_from_the_whole_history() {
+        let mut random = Lcg(20_070_101);
+        let mut reached = [0u32; 5];
+        for round in 0..200_000 {
+            let hold = if round % 4 == 0 { 1 + random.below(14) as u8 } else { 1 + random.below(3) as u8 };
+            let tolerance = random.below(5) as u16;
+            let length = 1 + random.below(if round % 50 == 0 { 700 } else { 130 }) as usize;
+            let received = stream(&mut random, hold, length);
+            let mut monitor = Monitor::new(MonitorSettings::new(hold, tolerance));
+            // Compared at a few cycles of each stream and at its end: deciding anew costs the whole history.
+            let mut history = History { received: Vec::new(), hold: hold.into(), tolerance: tolerance.into() };
+            for (k, &value) in received.iter().enumerate() {
+                let step = monitor.cycle(value);
+                history.received.push(value);
+                if step.tripped || step.entered.is_some() || k + 1 == length || random.below(16) == 0 {
+                    let seen = Seen { state: monitor.state(), failures: monitor.failures(), tripped: step.tripped };
+                    assert_eq!(history.decide(), seen, "n {hold} tolerance {tolerance} {:?}", history.received);
+                    reached[seen.state as usize] += 1;
+                    reached[4] += u32::from(seen.tripped);
+                }
+            }
+        }
+        assert!(reached.iter().all(|&count| count > 1_000), "{reached:?}");
+    }
+}
