@@ -262,8 +262,8 @@ mod tests {
         let ascending = [
             Key::new(at(-5), Phase::Send, 125, 9),
             Key::new(at(0), Phase::Command, 125, 9),
-            Key::new(at(0), Phase::Telegram, 125, 9),
             Key::new(at(0), Phase::Edge, 125, 9),
+            Key::new(at(0), Phase::Telegram, 125, 9),
             Key::new(at(0), Phase::Deadline, 1, 9),
             Key::new(at(0), Phase::Deadline, 2, 7),
             Key::new(at(0), Phase::Deadline, 2, 8),

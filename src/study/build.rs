@@ -225,3 +225,86 @@ fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Ac
         Action::ControlWord { value } => for_slaves(&|slave| controller::Command::ControlWord(slave, G1Stw(value))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::profile;
+    use crate::fdl::params::BusParams;
+    use crate::observation::Observation;
+    use crate::sim::motion::Motion;
+    use crate::sim::network::Until;
+    use crate::sim::noise::GcJitter;
+    use crate::sim::queue::{HeapQueue, NearQueue};
+    use crate::sim::record::{Recorder, Stamp, Transmission};
+    use crate::study::scenario::*;
+    use crate::time::{BitRate, Tbit};
+
+    fn small() -> Scenario {
+        let slave = |n: u8, device: &str| Slave {
+            address: Address::new(n).unwrap(),
+            device: profile::find(device).unwrap(),
+            position_mm: u64::from(n) * 10_000,
+            crystal: scenario::Crystal::Within(50_000),
+            t_sdr: Tbit(30),
+            times: IsoTimes {
+                t_i: Span::from_us(125),
+                t_o: Span::from_us(1250),
+                t_pll_w: Span::from_us(1),
+                t_pll_d: Span::ZERO,
+            },
+            motion: Motion::Speed { start: crate::sim::motion::Angle::ZERO, micro_rpm: 1_500_000_000 },
+            max_life_failures: 1,
+            clock_tolerance: 1,
+            code_sequence: CodeSequence::Cw,
+            functions: false,
+            scaling: None,
+            silent: false,
+            powered_at: Span::ZERO,
+        };
+        let mut slaves: Vec<Slave> = (3..=10).map(|n| slave(n, "posital-ocd-dpb1b")).collect();
+        slaves.push(slave(11, "subscriber-drive"));
+        Scenario {
+            name: "small".into(),
+            question: String::new(),
+            run: Run { seed: 1, duration: Extent::Cycles(200) },
+            bus: Bus { params: BusParams::profile(BitRate::M12), cable_mm: 100_000 },
+            master: scenario::Master {
+                address: Address::new(2).unwrap(),
+                position_mm: 0,
+                crystal: scenario::Crystal::Offset(0),
+                t_dp: Span::from_ms(2),
+                t_mapc: 1,
+                watchdog: Watchdog::of(Span::from_ms(200)),
+                get_cfg: true,
+                dx_retries: 1,
+                lost_after: 10,
+                clear_for: 0,
+                gc_jitter: GcJitter::BoundedNormal { sigma: Span::from_ns(100), bound: Span::from_ns(400) },
+                accumulate: false,
+                life_start: 1,
+            },
+            slaves,
+            links: vec![Link { publisher: Address::new(3).unwrap(), subscriber: Address::new(11).unwrap(), offset: 4, length: 4 }],
+            events: vec![],
+            disturbances: vec![],
+            record: Record { files: false, plots: false, tables: vec![], rows: 1 },
+        }
+    }
+
+    struct Print;
+    impl Recorder for Print {
+        fn telegram(&mut self, t: &Transmission<'_>) {
+            println!("{:>14.3} us  {:>4} -> {:02X?}", t.start.since_zero().as_us(), t.sender, t.octets);
+        }
+        fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+            println!("{:>14.3} us  {:>4}: {what}", stamp.at.since_zero().as_us(), stamp.station);
+        }
+    }
+    #[test]
+    fn smoke() {
+        let mut network: Network<Node, NearQueue<NetworkEvent>> = network(&small());
+        network.run(Until::Cycle(200), 1_000_000, &mut Print);
+        let _ = HeapQueue::<NetworkEvent>::default();
+    }
+}

@@ -7,6 +7,7 @@
 
 use crate::device::profile::Profile;
 use crate::fdl::params::BusParams;
+pub use crate::sim::fault::{Bursts, Disturbance, Service};
 use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
 use crate::time::{Span, Tbit};
@@ -275,58 +276,6 @@ pub enum Action {
     Operate,
 }
 
-/// Something that goes wrong on the line.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Disturbance {
-    /// The master's SYNCH never reaches the line.
-    MissingClocks {
-        /// In which cycles.
-        bursts: Bursts,
-    },
-    /// Telegrams reach nobody.
-    LostTelegrams {
-        /// Who sent them; none is anybody.
-        from: Option<Address>,
-        /// Whom they are for; none is anybody.
-        to: Option<Address>,
-        /// Which.
-        service: Service,
-        /// In which cycles.
-        bursts: Bursts,
-    },
-}
-
-/// Bus cycles in which something happens: `count` from `from_cycle` on, and again every `every` cycles.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Bursts {
-    /// The first one, counted from 0.
-    pub from_cycle: u64,
-    /// How many in a row, at least 1.
-    pub count: u64,
-    /// From the beginning of one burst to the next, at least `count`; none is one burst alone.
-    pub every: Option<u64>,
-}
-
-impl Bursts {
-    /// Whether it happens in `cycle`.
-    pub const fn contains(&self, cycle: u64) -> bool {
-        let Some(since) = cycle.checked_sub(self.from_cycle) else { return false };
-        match self.every {
-            Some(every) => since % every < self.count,
-            None => since < self.count,
-        }
-    }
-}
-
-/// Which telegrams a disturbance is about.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Service {
-    /// Data_Exchange alone, requests and replies.
-    DataExchange,
-    /// All.
-    Any,
-}
-
 /// What a run keeps.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Record {
@@ -380,12 +329,5 @@ mod tests {
                 assert_eq!(watchdog.span(), Span::from_ms(ms));
             }
         }
-    }
-
-    #[test]
-    fn bursts_repeat() {
-        let at = |bursts: Bursts| (0..12).filter(|&cycle| bursts.contains(cycle)).collect::<Vec<_>>();
-        assert_eq!(at(Bursts { from_cycle: 3, count: 2, every: None }), [3, 4]);
-        assert_eq!(at(Bursts { from_cycle: 1, count: 2, every: Some(5) }), [1, 2, 6, 7, 11]);
     }
 }
