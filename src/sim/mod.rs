@@ -6,6 +6,7 @@
 pub mod bus;
 pub mod crystal;
 pub mod fault;
+pub mod fingerprint;
 pub mod motion;
 pub mod noise;
 pub mod network;
