@@ -1,5 +1,7 @@
 //! Studies: scenario files, runs, what they record, and what is made of it. The only layer that knows files,
 //! threads and reports.
 
+pub mod plan;
+pub mod quantity;
 pub mod row;
 pub mod scenario;
