@@ -3,5 +3,6 @@
 
 pub mod build;
 pub mod plan;
+pub mod quantity;
 pub mod row;
 pub mod scenario;

@@ -5,6 +5,17 @@
 //! and the rules of the bus and of the devices are checked on the whole. What is wrong on the way is collected
 //! into one [`ScenarioError`].
 
+mod check;
+pub mod error;
+#[cfg(test)]
+mod faults;
+pub mod kinds;
+mod read;
+mod section;
+mod tree;
+
+pub use error::{Fault, Position, Problem, ScenarioError};
+
 use crate::device::profile::Profile;
 use crate::fdl::params::BusParams;
 pub use crate::sim::fault::{Bursts, Disturbance, Service};
@@ -12,6 +23,11 @@ use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
+use section::Reader;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use tree::Source;
 
 /// A whole scenario, complete and checked.
 #[derive(Clone, PartialEq, Debug)]
@@ -39,6 +55,47 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// Longest scenario file [octets].
+    pub const MAX_FILE: u64 = 4 << 20;
+
+    /// Reads the file `path` with `overrides`, pairs of a dotted key and a value: `("master.t_o", "1.5 ms")`,
+    /// `("slave.3.crystal", "20 ppm")` by address, `("link.1.length", "2")` by number from 1. A value is TOML if it can
+    /// be and a text otherwise.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no text, too long or empty, or [`Self::parse`] finds something wrong.
+    pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        let source = path.display().to_string();
+        let octets = read_file(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
+        let text = decode(&octets).map_err(|fault| ScenarioError::about_file(&source, fault))?;
+        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        Self::parse(&name, &source, text, overrides)
+    }
+
+    /// Reads `text` as the scenario `name`; messages call it `source`. `overrides` as for [`Self::load`].
+    ///
+    /// # Errors
+    /// The text is no TOML, a key is unknown, missing or wrong, or a rule of the bus or of a device is broken.
+    pub fn parse(name: &str, source: &str, text: &str, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        if text.trim().is_empty() {
+            let fault = Fault::new("the scenario is empty").help("it needs [run], [bus], [master] and a [[slave]]");
+            return Err(ScenarioError::about_file(source, fault));
+        }
+        let source = Source::new(source, text, overrides);
+        let root = source.parse()?;
+        let mut reader = Reader::new(&source);
+        let read = read::scenario(&mut reader, root);
+        let mut problems = reader.take_problems();
+        if let Some(mut scenario) = read.filter(|_| problems.is_empty()) {
+            problems = check::check(&scenario, &mut reader);
+            if problems.is_empty() {
+                name.clone_into(&mut scenario.name);
+                scenario.question = question(text);
+                return Ok(scenario);
+            }
+        }
+        Err(ScenarioError { problems })
+    }
     /// The slave with this address.
     pub fn slave(&self, address: Address) -> Option<&Slave> {
         self.slaves.binary_search_by_key(&address, |slave| slave.address).ok().map(|index| &self.slaves[index])
@@ -47,6 +104,54 @@ impl Scenario {
     pub fn publishes(&self, address: Address) -> bool {
         self.links.iter().any(|link| link.publisher == address)
     }
+}
+
+/// The octets of the file `path`.
+fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
+    let unreadable = |error: std::io::Error| {
+        Fault::new(match error.kind() {
+            std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+            std::io::ErrorKind::PermissionDenied => "this file may not be read".to_owned(),
+            _ => format!("this file cannot be read: {error}"),
+        })
+    };
+    let metadata = std::fs::metadata(path).map_err(unreadable)?;
+    if metadata.is_dir() {
+        return Err(Fault::new("this is a directory").help("name one scenario file in it, *.toml"));
+    }
+    let too_long = |megabytes: u64| {
+        Fault::new(format!("a {megabytes} MB file is no scenario")).rule("a scenario has at most 4 MB")
+    };
+    if metadata.len() > Scenario::MAX_FILE {
+        return Err(too_long(metadata.len().div_ceil(1_000_000)));
+    }
+    // A device or a pipe has no length: no more is read than a scenario may have.
+    let mut octets = Vec::new();
+    let file = File::open(path).map_err(unreadable)?;
+    file.take(Scenario::MAX_FILE + 1).read_to_end(&mut octets).map_err(unreadable)?;
+    if octets.len() as u64 > Scenario::MAX_FILE {
+        return Err(too_long(5));
+    }
+    Ok(octets)
+}
+
+/// The text that `octets` are, without a byte order mark.
+fn decode(octets: &[u8]) -> Result<&str, Fault> {
+    let text = std::str::from_utf8(octets).map_err(|error| {
+        let line = octets[..error.valid_up_to()].iter().filter(|&&octet| octet == b'\n').count() + 1;
+        let octet = octets[error.valid_up_to()];
+        Fault::new(format!("this file is no UTF-8 text: octet {octet:02X} in line {line}"))
+            .help("save it as UTF-8; a scenario is a text file")
+    })?;
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
+}
+
+/// The leading comment of `text`, without its marks.
+fn question(text: &str) -> String {
+    let lines = text.lines().skip_while(|line| line.trim().is_empty());
+    let comment = lines.map_while(|line| line.trim_start().strip_prefix('#'));
+    let lines: Vec<_> = comment.map(|line| line.strip_prefix(' ').unwrap_or(line).trim_end()).collect();
+    lines.join("\n").trim().to_owned()
 }
 
 /// How long a run is and which draws it makes.
@@ -72,8 +177,18 @@ pub enum Extent {
 pub struct Bus {
     /// Bit rate and the times of the data link layer.
     pub params: BusParams,
-    /// Length of the cable [mm].
+    /// Length of the cable [mm], at most [`Bus::MAX_CABLE_MM`].
     pub cable_mm: u64,
+}
+
+impl Bus {
+    /// The longest cable [mm], 100 km. Model: no network of copper and glass comes near it.
+    pub const MAX_CABLE_MM: u64 = 100_000_000;
+
+    /// T_TD, how long a signal takes for `mm` of cable: 5 ns/m (PROFIBUS network manual), rounded up to a tick.
+    pub const fn propagation(mm: u64) -> Span {
+        Span::from_ticks((mm * 60).div_ceil(1_000) as i64)
+    }
 }
 
 /// The master with its application.
@@ -313,8 +428,64 @@ impl CsvTable {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+    use crate::device::profile::PROFILES;
+    use crate::sim::motion::Angle;
+    use crate::time::BitRate;
+
+    /// `n` slaves of the kind `device` from address 3 on at a bus without length, T_DP 8 ms.
+    pub(crate) fn network(rate: BitRate, device: &'static Profile, n: u8) -> Scenario {
+        let address = |number| Address::new(number).unwrap();
+        let (t_i, t_o, t_pll_w) = (Span::from_us(125), Span::from_ms(4), Span::from_us(1));
+        let slave = |number| Slave {
+            address: address(number),
+            device,
+            position_mm: 0,
+            crystal: Crystal::Offset(0),
+            t_sdr: Tbit(30),
+            times: IsoTimes { t_i, t_o, t_pll_w, t_pll_d: Span::ZERO },
+            motion: Motion::Standstill { at: Angle::ZERO },
+            max_life_failures: 1,
+            clock_tolerance: 1,
+            code_sequence: CodeSequence::Cw,
+            functions: false,
+            scaling: None,
+            silent: false,
+            powered_at: Span::ZERO,
+        };
+        Scenario {
+            name: "network".into(),
+            question: String::new(),
+            run: Run { seed: 1, duration: Extent::Cycles(1_000) },
+            bus: Bus { params: BusParams::profile(rate), cable_mm: 0 },
+            master: Master {
+                address: address(2),
+                position_mm: 0,
+                crystal: Crystal::Offset(0),
+                t_dp: Span::from_ms(8),
+                t_mapc: 1,
+                watchdog: Watchdog::of(Span::from_ms(200)),
+                get_cfg: true,
+                dx_retries: 1,
+                lost_after: 10,
+                clear_for: 0,
+                gc_jitter: GcJitter::None,
+                accumulate: false,
+                life_start: 1,
+            },
+            slaves: (3..3 + n).map(slave).collect(),
+            links: Vec::new(),
+            events: Vec::new(),
+            disturbances: Vec::new(),
+            record: Record {
+                files: true,
+                plots: true,
+                tables: CsvTable::ALL.iter().map(|&(_, table)| table).collect(),
+                rows: 20_000,
+            },
+        }
+    }
 
     #[test]
     fn a_watchdog_is_a_product_of_two_factors() {
