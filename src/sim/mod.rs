@@ -7,3 +7,4 @@ pub mod crystal;
 pub mod motion;
 pub mod noise;
 pub mod queue;
+pub mod record;

@@ -1,4 +1,13 @@
 //! Studies: scenario files, runs, what they record, and what is made of it. The only layer that knows files,
 //! threads and reports.
 
+pub mod count;
+pub mod export;
+pub mod histogram;
+pub mod layout;
+pub mod metric;
+pub mod report;
 pub mod row;
+#[cfg(test)]
+mod sample;
+pub mod summary;
