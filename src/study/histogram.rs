@@ -209,7 +209,9 @@ impl Histogram {
     fn recorded(&self) -> Vec<(i64, u64)> {
         let side = |side: &hdrhistogram::Histogram<u64>, sign: i64| {
             let place = |value| sign * side.median_equivalent(value) as i64;
-            side.iter_recorded().map(|step| (place(step.value_iterated_to()), step.count_at_value())).collect::<Vec<_>>()
+            side.iter_recorded()
+                .map(|step| (place(step.value_iterated_to()), step.count_at_value()))
+                .collect::<Vec<_>>()
         };
         let mut all = self.negative.as_ref().map_or_else(Vec::new, |negative| side(negative, -1));
         all.reverse();
@@ -469,12 +471,14 @@ mod tests {
     #[test]
     fn signs_are_kept_and_small_values_are_exact() {
         let histogram = filled(&[-2_047, -3, -1, 0, 1, 2, 2_000]);
-        let percentiles = [0.0, 14.0, 28.0, 42.0, 57.0, 71.0, 85.0, 100.0].map(|p| histogram.percentile(p).unwrap().ticks());
+        let percentiles =
+            [0.0, 14.0, 28.0, 42.0, 57.0, 71.0, 85.0, 100.0].map(|p| histogram.percentile(p).unwrap().ticks());
         assert_eq!(percentiles, [-2_047, -2_047, -3, -1, 0, 1, 2, 2_000]);
         assert_eq!((histogram.min(), histogram.max()), (Some(ticks(-2_047)), Some(ticks(2_000))));
         assert_eq!(histogram.mean(), Some(ticks(-7))); // -48 / 7 = -6.86
         assert_eq!(histogram.farthest(), Some(ticks(-2_047)));
-        let magnitudes = [1.0, 28.0, 42.0, 57.0, 71.0, 85.0, 100.0].map(|p| histogram.magnitude_percentile(p).unwrap().ticks());
+        let magnitudes =
+            [1.0, 28.0, 42.0, 57.0, 71.0, 85.0, 100.0].map(|p| histogram.magnitude_percentile(p).unwrap().ticks());
         assert_eq!(magnitudes, [0, 1, 1, 2, 3, 2_000, 2_047]);
     }
 
@@ -546,15 +550,50 @@ mod tests {
     #[test]
     fn every_measured_span_of_a_row_has_a_line() {
         // Destructured in full: a new field of a row does not compile here until someone decides whether it is measured.
-        let CycleRow { cycle: _, t0: _, gc_jitter, t_dp: _, t_dp_deviation, t_dx, latch_skew, skew_counts: _, retries: _, acyclic: _, spare } =
-            sample::cycle(1);
+        let CycleRow {
+            cycle: _,
+            t0: _,
+            gc_jitter,
+            t_dp: _,
+            t_dp_deviation,
+            t_dx,
+            latch_skew,
+            skew_counts: _,
+            retries: _,
+            acyclic: _,
+            spare,
+        } = sample::cycle(1);
         let SlaveRow {
-            cycle: _, t0: _, slave: _, state: _, phase: _, pll: _, pll_error, period: _, window: _, latch_offset,
-            mls: _, sls: _, life_counter: _, clock_counter: _, g1_zsw: _, xist1: _, xist2: _,
+            cycle: _,
+            t0: _,
+            slave: _,
+            state: _,
+            phase: _,
+            pll: _,
+            pll_error,
+            period: _,
+            window: _,
+            latch_offset,
+            mls: _,
+            sls: _,
+            life_counter: _,
+            clock_counter: _,
+            g1_zsw: _,
+            xist1: _,
+            xist2: _,
         } = sample::slave(1, 3);
         let LinkRow { cycle: _, publisher: _, subscriber: _, wire, publish, age } = sample::link(1);
         let measured = [
-            Some(gc_jitter), t_dp_deviation, t_dx, latch_skew, spare, pll_error, latch_offset, Some(wire), Some(publish), age,
+            Some(gc_jitter),
+            t_dp_deviation,
+            t_dx,
+            latch_skew,
+            spare,
+            pll_error,
+            latch_offset,
+            Some(wire),
+            Some(publish),
+            age,
         ];
         let recorded: BTreeSet<_> = QUANTITIES
             .iter()
@@ -588,6 +627,9 @@ mod tests {
         twice.merge(&histograms);
         assert_eq!(twice.get("wire", Subject::Link(a(3), a(5))).map(Histogram::count), Some(2));
         let stranger = SlaveLayout { address: a(9), t_i: Span::from_us(125) };
-        assert_eq!(Quantity::named("age").unwrap().subjects(&Layout::new(a(1), Span::from_ms(1), vec![stranger], vec![])), []);
+        assert_eq!(
+            Quantity::named("age").unwrap().subjects(&Layout::new(a(1), Span::from_ms(1), vec![stranger], vec![])),
+            []
+        );
     }
 }

@@ -316,3 +316,250 @@ impl Watch {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observation::{Inputs, SlaveCause};
+    use crate::study::sample::{self, address};
+
+    /// Keeps every row.
+    #[derive(Default)]
+    struct Kept {
+        cycles: Vec<CycleRow>,
+        slaves: Vec<SlaveRow>,
+        links: Vec<LinkRow>,
+        events: Vec<EventRow>,
+        order: String,
+    }
+    impl Sink for Kept {
+        fn cycle(&mut self, row: &CycleRow) {
+            self.cycles.push(*row);
+            self.order.push('c');
+        }
+        fn slave(&mut self, row: &SlaveRow) {
+            self.slaves.push(*row);
+            self.order.push('s');
+        }
+        fn link(&mut self, row: &LinkRow) {
+            self.links.push(*row);
+            self.order.push('l');
+        }
+        fn event(&mut self, row: &EventRow) {
+            self.events.push(*row);
+            self.order.push('e');
+        }
+    }
+
+    type Speed = fn(Address, Time) -> f64;
+    /// A run of the sample's network that is told step by step, in true nanoseconds.
+    struct Told {
+        metrics: Metrics<Kept, Speed>,
+        master: Crystal,
+    }
+    fn at(ns: i64) -> Time {
+        Time::ZERO + Span::from_ns(ns)
+    }
+    impl Told {
+        /// The master is `ppb` fast and reads 1 s at true time zero; slave 3 turns at 10^6 steps/s, slave 5 back at 2 x 10^6.
+        fn new(ppb: i64) -> Self {
+            let speed: Speed = |slave, _| if slave.get() == 3 { 1e6 } else { -2e6 };
+            let master = Crystal::new(ppb, Local::ZERO + Span::from_s(1)).unwrap();
+            Self { metrics: Metrics::new(sample::layout(), speed, Kept::default()), master }
+        }
+        fn tell(&mut self, ns: i64, station: u8, what: Observation) {
+            let stamp = Stamp { at: at(ns), station: address(station), crystal: &self.master };
+            self.metrics.observe(stamp, &what);
+        }
+        fn cycle(&mut self, ns: i64, cycle: u64) {
+            let nominal = Local::ZERO + Span::from_s(1) + Span::from_ms(cycle as i64);
+            self.tell(ns, 1, Observation::CycleStart { cycle, nominal });
+        }
+        fn latch(&mut self, ns: i64, station: u8, locked: bool) {
+            let inputs = Inputs { zsw2: 0, g1_zsw: 0x2000, xist1: ns as u32, xist2: 7 };
+            self.tell(ns, station, Observation::Latch { locked, inputs });
+        }
+        fn reply(&mut self, ns: i64, station: u8, destination: u8) {
+            let octets = [0x68, 4, 4, 0x68, destination, station, 0x08, 0, 0, 0x16];
+            let telegram =
+                Transmission { start: at(ns), end: at(ns + 9_000), sender: address(station), octets: &octets };
+            self.metrics.telegram(&telegram);
+        }
+        fn over(self, ns: i64) -> (Counts, Kept) {
+            self.metrics.finish(at(ns))
+        }
+    }
+
+    #[test]
+    fn a_cycle_row_has_the_masters_numbers() {
+        let mut told = Told::new(0);
+        told.cycle(40, 0);
+        told.tell(449_040, 1, Observation::ExchangeDone { t_dx: Span::from_us(449), retries: 1 });
+        told.tell(449_040, 1, Observation::Retry { slave: address(5) });
+        let (acyclic, spare) = (Span::from_us(51), Span::from_us(488));
+        told.tell(500_000, 1, Observation::CycleSpare { acyclic, spare });
+        told.cycle(999_970, 1);
+        told.cycle(3_000_000, 3);
+        let (counts, kept) = told.over(3_500_000);
+        assert_eq!(kept.order, "ecsscsscss");
+        let [first, second, third] = kept.cycles[..] else { panic!("three cycles") };
+        assert_eq!(
+            (first.t0, first.gc_jitter, first.t_dp, first.t_dp_deviation),
+            (at(40), Span::from_ns(40), None, None)
+        );
+        assert_eq!((first.t_dx, first.retries), (Some(Span::from_us(449)), 1));
+        assert_eq!((first.acyclic, first.spare), (Some(acyclic), Some(spare)));
+        assert_eq!((second.gc_jitter, second.t_dp), (Span::from_ns(-30), Some(Span::from_ns(999_930))));
+        assert_eq!((second.t_dp_deviation, second.t_dx), (Some(Span::from_ns(-70)), None));
+        assert_eq!((third.cycle, third.gc_jitter, third.t_dp), (3, Span::ZERO, None), "cycle 2 is missing");
+        assert_eq!((counts.network.cycles, counts.network.retries, counts.slaves[1].retries), (3, 1, 1));
+        assert_eq!(counts.network.duration, Span::from_ns(3_500_000));
+    }
+
+    #[test]
+    fn latches_are_measured_from_the_nominal_grid() {
+        let mut told = Told::new(0);
+        told.cycle(500, 0); // late: the grid does not move
+        told.latch(875_030, 3, true);
+        told.latch(874_990, 5, true);
+        told.cycle(1_000_000, 1);
+        told.latch(1_875_012, 3, true);
+        told.latch(1_100_000, 5, false);
+        told.cycle(2_000_000, 2);
+        let (counts, kept) = told.over(2_500_000);
+        assert_eq!(kept.cycles[0].latch_skew, Some(Span::from_ns(40)));
+        // 30 ns x 10^6 and -10 ns x -2 x 10^6 steps/s: 0.03 and 0.02 steps.
+        assert!((kept.cycles[0].skew_counts.unwrap() - 0.01).abs() < 1e-12);
+        assert_eq!(counts.network.skew_counts, kept.cycles[0].skew_counts);
+        assert_eq!((kept.cycles[1].latch_skew, kept.cycles[1].skew_counts), (None, None), "one slave has no skew");
+        let offsets: Vec<_> = kept.slaves.iter().map(|row| (row.slave.get(), row.latch_offset)).collect();
+        let ns = |n| Some(Span::from_ns(n));
+        assert_eq!(offsets, [(3, ns(30)), (5, ns(-10)), (3, ns(12)), (5, None), (3, None), (5, None)]);
+        assert_eq!((kept.slaves[3].g1_zsw, kept.slaves[3].xist1, kept.slaves[3].xist2), (0x2000, 1_100_000, 7));
+        assert_eq!(kept.slaves[4].xist1, 1_875_012, "carried over");
+    }
+
+    #[test]
+    fn the_grid_is_counted_by_the_masters_crystal() {
+        let mut told = Told::new(100_000); // 100 ppm fast
+        told.cycle(0, 0);
+        told.latch(875_000, 3, true);
+        told.cycle(999_900, 1);
+        let (_, kept) = told.over(1_000_000);
+        // 875 µs of the master take 874 912.509 ns: 10 498 950.105 ticks, the first whole tick is 10 498 951.
+        assert_eq!(kept.slaves[0].latch_offset, Some(Span::from_ns(875_000) - Span::from_ticks(10_498_951)));
+        // Nominal t0(1) is at 999 900.01 ns: 11 998 800.12 ticks, 11 998 801.
+        assert_eq!(kept.cycles[1].gc_jitter, Span::from_ticks(-1));
+    }
+
+    #[test]
+    fn the_clock_of_a_slave_is_carried_over_and_its_error_is_not() {
+        let (period, window) = (Span::from_ms(1), Span::from_us(4));
+        let clock =
+            |verdict, ns, counter| Observation::Clock { verdict, error: Span::from_ns(ns), period, window, counter };
+        let mut told = Told::new(0);
+        told.cycle(0, 0);
+        told.tell(10, 3, Observation::Pll { from: PllState::Idle, to: PllState::Waiting });
+        told.tell(20, 3, clock(ClockVerdict::First, 0, 0));
+        told.tell(20, 3, Observation::Pll { from: PllState::Waiting, to: PllState::Narrowing });
+        told.cycle(1_000_000, 1);
+        told.tell(1_000_020, 3, clock(ClockVerdict::Hit, -12, 0));
+        told.cycle(2_000_000, 2);
+        told.tell(2_000_020, 3, clock(ClockVerdict::Outside, 9_000, 10));
+        told.cycle(3_000_000, 3);
+        told.tell(3_004_020, 3, clock(ClockVerdict::Missing, 0, 20));
+        told.tell(3_004_021, 3, clock(ClockVerdict::Stray, 5, 99));
+        told.cycle(4_000_000, 4);
+        told.tell(4_000_020, 3, Observation::Pll { from: PllState::Narrowing, to: PllState::Waiting });
+        let (counts, kept) = told.over(5_000_000);
+        let rows: Vec<_> = kept.slaves.iter().filter(|row| row.slave.get() == 3).collect();
+        let errors: Vec<_> = rows.iter().map(|row| row.pll_error.map(|error| error.as_ns())).collect();
+        assert_eq!(errors, [None, Some(-12.0), Some(9_000.0), None, None]);
+        assert_eq!(rows.iter().map(|row| row.clock_counter).collect::<Vec<_>>(), [0, 0, 10, 20, 20]);
+        let periods: Vec<_> = rows.iter().map(|row| (row.period, row.window, row.pll)).collect();
+        assert_eq!(periods[0], (Some(period), Some(window), PllState::Narrowing));
+        assert_eq!(periods[4], (None, None, PllState::Waiting));
+        assert_eq!(kept.slaves[1].period, None, "slave 5 saw nothing");
+        assert_eq!(counts.slaves[0].clock_failures, 2);
+        assert_eq!(kept.events.iter().map(|event| event.cycle).collect::<Vec<_>>(), [0, 0, 0, 2, 3, 3, 4]);
+    }
+
+    #[test]
+    fn latencies_follow_the_value_from_latch_to_use() {
+        let (subscribed, used) = (
+            Observation::Subscribed { publisher: address(3) },
+            Observation::Used { publisher: address(3), position: 0 },
+        );
+        let mut told = Told::new(0);
+        let mut cycle = |start: i64, number, latched| {
+            told.cycle(start, number);
+            told.reply(start + 90_000, 3, 127);
+            told.reply(start + 95_000, 3, 1); // an answer to the master alone
+            told.tell(start + 110_000, 5, subscribed);
+            told.tell(start + 130_000, 5, subscribed);
+            if number != 2 {
+                told.tell(start + 700_000, 5, used);
+            }
+            told.latch(start + 875_000, 3, latched);
+        };
+        cycle(0, 0, true); // nothing was latched before
+        cycle(1_000_000, 1, true);
+        cycle(2_000_000, 2, false); // a value, but not used
+        cycle(3_000_000, 3, true); // the value of a free-running latch
+        told.cycle(4_000_000, 4);
+        told.tell(4_700_000, 5, used); // an old value
+        let (_, kept) = told.over(5_000_000);
+        let row = |cycle, age| LinkRow {
+            cycle,
+            publisher: address(3),
+            subscriber: address(5),
+            wire: Span::from_us(20),
+            publish: Span::from_us(235),
+            age,
+        };
+        assert_eq!(kept.links, [row(1, Some(Span::from_us(825))), row(2, None)]);
+        assert!(kept.order.starts_with("csscssl"), "{}", kept.order);
+    }
+
+    #[test]
+    fn counts_are_by_slave_and_by_code() {
+        let mut told = Told::new(0);
+        let pll = |from, to| Observation::Pll { from, to };
+        let period = Span::from_ms(1);
+        let first =
+            Observation::Clock { verdict: ClockVerdict::First, error: Span::ZERO, period, window: period, counter: 0 };
+        told.cycle(0, 0);
+        let (from, to, cause) = (SlaveState::PowerOn, SlaveState::WaitPrm, SlaveCause::Initialised);
+        told.tell(100, 3, Observation::SlaveState { from, to, cause });
+        told.tell(1_000, 3, Observation::Phase { from: Phase::Configuration, to: Phase::Clock });
+        told.tell(2_000, 3, first);
+        for cycle in 1..=20 {
+            told.cycle(cycle * 1_000_000, cycle as u64);
+        }
+        told.tell(20_002_000, 3, pll(PllState::Settling, PllState::Locked));
+        told.tell(21_000_000, 3, pll(PllState::Locked, PllState::Waiting));
+        told.tell(22_000_000, 3, first);
+        told.tell(23_000_000, 3, pll(PllState::Settling, PllState::Locked));
+        for code in [0x0F04, 0x0F02, 0x0F04] {
+            told.tell(23_000_000, 3, Observation::Fault { code });
+        }
+        told.tell(23_000_000, 3, Observation::Acknowledged { code: 0x0F04 });
+        told.tell(23_000_000, 3, Observation::Collision { with: address(1) });
+        told.tell(23_000_000, 1, Observation::ClockLate { by: Span::from_us(1) });
+        told.tell(23_000_000, 1, Observation::NoAnswer { slave: address(5) });
+        told.tell(23_000_000, 1, Observation::NoAnswer { slave: address(77) });
+        told.tell(23_000_000, 1, Observation::TokenClaimed);
+        let (counts, kept) = told.over(25_000_000);
+        let (slave, other, network) = (&counts.slaves[0], &counts.slaves[1], &counts.network);
+        assert_eq!(slave.faults.iter().collect::<Vec<_>>(), [(&0x0F02, &1), (&0x0F04, &2)]);
+        assert_eq!((slave.fault_count(), slave.acknowledgements, slave.resynchronisations), (3, 1, 1));
+        assert_eq!(slave.lock, Some(super::super::count::Lock { cycles: 20, span: Span::from_ms(20) }));
+        assert_eq!((slave.state, slave.phase, slave.pll), (SlaveState::WaitPrm, Phase::Clock, PllState::Locked));
+        let (none, before, after) = (Span::ZERO, Span::from_us(1), Span::from_us(24_999));
+        assert_eq!(slave.phases, [before, after, none, none, none]);
+        assert_eq!((other.lock, other.phases[0], other.no_answers), (None, Span::from_ms(25), 1));
+        assert_eq!((network.late_clocks, network.no_answers), (1, 2));
+        assert_eq!((network.tokens_claimed, network.collisions), (1, 1));
+        assert_eq!(network.events, kept.events.len() as u64);
+    }
+}
