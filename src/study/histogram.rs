@@ -137,39 +137,18 @@ impl Histogram {
         if rank <= self.below {
             return self.min();
         }
-        let mut left = rank - self.below;
-        if let Some(negative) = &self.negative
-            && left <= negative.len()
-        {
-            let ticks = of_rank(negative, negative.len() - left + 1)?;
-            return Some(self.clamped(-ticks));
-        }
-        left -= self.negative_count();
-        of_rank(&self.positive, left).map_or_else(|| self.max(), |ticks| Some(self.clamped(ticks)))
+        let ticks = of_rank(&self.recorded(), rank - self.below);
+        ticks.map_or_else(|| self.max(), |ticks| Some(Span::from_ticks(ticks.clamp(self.min, self.max))))
     }
 
     /// The same for the magnitudes of the values, whatever their sign.
     pub fn magnitude_percentile(&self, percent: f64) -> Option<Span> {
-        let mut left = self.rank(percent)?;
-        let mut ups = self.positive.iter_recorded().peekable();
-        let mut downs = self.negative.as_ref().map(|side| side.iter_recorded().peekable());
-        loop {
-            let up = ups.peek().map(hdrhistogram::iterators::IterationValue::value_iterated_to);
-            let down = downs.as_mut().and_then(|side| side.peek().map(|step| step.value_iterated_to()));
-            let (step, side) = match (up, down) {
-                (None, None) => return self.farthest().map(Span::abs),
-                (Some(u), Some(d)) if u > d => (downs.as_mut().and_then(Iterator::next), &self.negative),
-                (None, Some(_)) => (downs.as_mut().and_then(Iterator::next), &self.negative),
-                (Some(_), _) => (ups.next(), &None),
-            };
-            let step = step?;
-            if left <= step.count_at_value() {
-                let ticks = side.as_ref().unwrap_or(&self.positive).median_equivalent(step.value_iterated_to());
-                let farthest = self.min.unsigned_abs().max(self.max.unsigned_abs());
-                return Some(Span::from_ticks(ticks.min(farthest) as i64));
-            }
-            left -= step.count_at_value();
-        }
+        let rank = self.rank(percent)?;
+        let farthest = self.farthest()?.abs();
+        let mut magnitudes: Vec<_> = self.recorded().into_iter().map(|(ticks, count)| (ticks.abs(), count)).collect();
+        magnitudes.sort_unstable();
+        let ticks = of_rank(&magnitudes, rank);
+        Some(ticks.map_or(farthest, |ticks| Span::from_ticks(ticks).min(farthest)))
     }
 
     /// At most `bins` bins of equal width that hold everything in range, for drawing.
@@ -226,19 +205,16 @@ impl Histogram {
         let rank = (thousandths * u128::from(self.count())).div_ceil(100_000) as u64;
         (self.count() > 0).then_some(rank.max(1))
     }
-    fn clamped(&self, ticks: i64) -> Span {
-        Span::from_ticks(ticks.clamp(self.min, self.max))
-    }
 }
 
-/// The `rank`-th smallest value [ticks], from 1; none beyond the last.
-fn of_rank(side: &hdrhistogram::Histogram<u64>, rank: u64) -> Option<i64> {
+/// The `rank`-th value, from 1, of ascending values with their counts; none beyond the last.
+fn of_rank(recorded: &[(i64, u64)], rank: u64) -> Option<i64> {
     let mut left = rank;
-    for step in side.iter_recorded() {
-        if left <= step.count_at_value() {
-            return Some(side.median_equivalent(step.value_iterated_to()) as i64);
+    for &(value, count) in recorded {
+        if left <= count {
+            return Some(value);
         }
-        left -= step.count_at_value();
+        left -= count;
     }
     None
 }
@@ -358,17 +334,38 @@ impl core::fmt::Display for Subject {
 #[derive(Clone, Debug)]
 pub struct Histograms {
     layout: Layout,
-    /// By quantity as in [`QUANTITIES`], then by subject.
-    all: Vec<Vec<Histogram>>,
+    network: Vec<Recorded<CycleRow>>,
+    slave: Vec<Recorded<SlaveRow>>,
+    link: Vec<Recorded<LinkRow>>,
+}
+
+/// One quantity of all its subjects, in their order.
+#[derive(Debug)]
+struct Recorded<R> {
+    name: &'static str,
+    of: fn(&R) -> Option<Span>,
+    subjects: Vec<Histogram>,
+}
+impl<R> Clone for Recorded<R> {
+    fn clone(&self) -> Self {
+        Self { name: self.name, of: self.of, subjects: self.subjects.clone() }
+    }
 }
 
 impl Histograms {
     /// Empty histograms for a network.
     pub fn new(layout: &Layout) -> Self {
-        let empty = |quantity: &Quantity| {
-            vec![Histogram::new(quantity.limit, quantity.signed); quantity.subjects(layout).len()]
-        };
-        Self { layout: layout.clone(), all: QUANTITIES.iter().map(empty).collect() }
+        let mut new = Self { layout: layout.clone(), network: Vec::new(), slave: Vec::new(), link: Vec::new() };
+        for quantity in QUANTITIES {
+            let empty = Histogram::new(quantity.limit, quantity.signed);
+            let (name, subjects) = (quantity.name, vec![empty; quantity.subjects(layout).len()]);
+            match quantity.source {
+                Source::Network(of) => new.network.push(Recorded { name, of, subjects }),
+                Source::Slave(of) => new.slave.push(Recorded { name, of, subjects }),
+                Source::Link(of) => new.link.push(Recorded { name, of, subjects }),
+            }
+        }
+        new
     }
 
     /// The network these are of.
@@ -377,20 +374,19 @@ impl Histograms {
     }
     /// The histogram of the quantity `name` of `subject`; none if there is no such quantity or subject.
     pub fn get(&self, name: &str, subject: Subject) -> Option<&Histogram> {
-        let number = QUANTITIES.iter().position(|quantity| quantity.name == name)?;
-        let index = match (QUANTITIES[number].source, subject) {
-            (Source::Network(_), Subject::Network) => Some(0),
-            (Source::Slave(_), Subject::Slave(address)) => self.layout.slave(address),
-            (Source::Link(_), Subject::Link(publisher, subscriber)) => self.layout.link(publisher, subscriber),
-            _ => None,
-        };
-        self.all[number].get(index?)
+        match subject {
+            Subject::Network => named(&self.network, name)?.first(),
+            Subject::Slave(address) => named(&self.slave, name)?.get(self.layout.slave(address)?),
+            Subject::Link(publisher, subscriber) => {
+                named(&self.link, name)?.get(self.layout.link(publisher, subscriber)?)
+            }
+        }
     }
-    /// Everything, by quantity, then by subject.
+    /// Everything, by quantity as in [`QUANTITIES`], then by subject.
     pub fn iter(&self) -> impl Iterator<Item = (&'static Quantity, Subject, &Histogram)> {
-        QUANTITIES.iter().zip(&self.all).flat_map(|(quantity, histograms)| {
-            let subjects = quantity.subjects(&self.layout);
-            subjects.into_iter().zip(histograms).map(move |(subject, histogram)| (quantity, subject, histogram))
+        QUANTITIES.iter().flat_map(move |quantity| {
+            let subjects = quantity.subjects(&self.layout).into_iter();
+            subjects.filter_map(move |subject| Some((quantity, subject, self.get(quantity.name, subject)?)))
         })
     }
     /// Adds everything that `other` counted, for repetitions of one run.
@@ -399,42 +395,43 @@ impl Histograms {
     /// If `other` is of another network.
     pub fn merge(&mut self, other: &Self) {
         assert_eq!(self.layout, other.layout, "histograms of different networks");
-        for (mine, theirs) in self.all.iter_mut().flatten().zip(other.all.iter().flatten()) {
-            mine.merge(theirs);
-        }
+        merge(&mut self.network, &other.network);
+        merge(&mut self.slave, &other.slave);
+        merge(&mut self.link, &other.link);
     }
+}
 
-    /// Records what `of` finds in a row, for the subject of number `index`.
-    fn record(&mut self, index: usize, of: impl Fn(&Source) -> Option<Span>) {
-        for (quantity, histograms) in QUANTITIES.iter().zip(&mut self.all) {
-            if let Some(value) = of(&quantity.source) {
-                histograms[index].record(value);
-            }
+fn named<'a, R>(all: &'a [Recorded<R>], name: &str) -> Option<&'a [Histogram]> {
+    all.iter().find(|recorded| recorded.name == name).map(|recorded| &recorded.subjects[..])
+}
+
+fn merge<R>(all: &mut [Recorded<R>], others: &[Recorded<R>]) {
+    for (mine, theirs) in all.iter_mut().zip(others) {
+        mine.subjects.iter_mut().zip(&theirs.subjects).for_each(|(mine, theirs)| mine.merge(theirs));
+    }
+}
+
+/// Records what a row tells of the subject of number `index`.
+fn record<R>(all: &mut [Recorded<R>], index: usize, row: &R) {
+    for recorded in all {
+        if let Some(value) = (recorded.of)(row) {
+            recorded.subjects[index].record(value);
         }
     }
 }
 
 impl Sink for Histograms {
     fn cycle(&mut self, row: &CycleRow) {
-        self.record(0, |source| match source {
-            Source::Network(of) => of(row),
-            _ => None,
-        });
+        record(&mut self.network, 0, row);
     }
     fn slave(&mut self, row: &SlaveRow) {
         if let Some(index) = self.layout.slave(row.slave) {
-            self.record(index, |source| match source {
-                Source::Slave(of) => of(row),
-                _ => None,
-            });
+            record(&mut self.slave, index, row);
         }
     }
     fn link(&mut self, row: &LinkRow) {
         if let Some(index) = self.layout.link(row.publisher, row.subscriber) {
-            self.record(index, |source| match source {
-                Source::Link(of) => of(row),
-                _ => None,
-            });
+            record(&mut self.link, index, row);
         }
     }
 }
@@ -452,7 +449,9 @@ mod tests {
     }
     fn filled(values: &[i64]) -> Histogram {
         let mut histogram = Histogram::new(Span::from_ms(10), true);
-        values.iter().for_each(|&value| histogram.record(ticks(value)));
+        for &value in values {
+            histogram.record(ticks(value));
+        }
         histogram
     }
     /// The exact value of a percentile, by sorting.

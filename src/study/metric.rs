@@ -473,7 +473,7 @@ mod tests {
         told.tell(4_000_020, 3, Observation::Pll { from: PllState::Narrowing, to: PllState::Waiting });
         let (counts, kept) = told.over(5_000_000);
         let rows: Vec<_> = kept.slaves.iter().filter(|row| row.slave.get() == 3).collect();
-        let errors: Vec<_> = rows.iter().map(|row| row.pll_error.map(|error| error.as_ns())).collect();
+        let errors: Vec<_> = rows.iter().map(|row| row.pll_error.map(Span::as_ns)).collect();
         assert_eq!(errors, [None, Some(-12.0), Some(9_000.0), None, None]);
         assert_eq!(rows.iter().map(|row| row.clock_counter).collect::<Vec<_>>(), [0, 0, 10, 20, 20]);
         let periods: Vec<_> = rows.iter().map(|row| (row.period, row.window, row.pll)).collect();

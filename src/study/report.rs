@@ -67,7 +67,7 @@ fn slaves(summary: &Summary, lines: &mut Vec<String>) {
         ["slave", "device", "state", "phase", "lock", "PLL error p99", "max", "latch offset mean", "max", "faults"];
     let rows = shown.iter().map(|slave| slave_cells(slave)).collect::<Vec<_>>();
     lines.push(String::new());
-    lines.extend(aligned(&header, &[1, 2, 3], &rows));
+    lines.extend(aligned(&header, &[1, 2, 3, 9], &rows));
     if more > 0 {
         lines.push(format!("the {SLAVES} worst of {} slaves; {more} more are no worse", summary.slaves.len()));
     }
@@ -164,8 +164,8 @@ fn files(summary: &Summary, dir: Option<&str>, lines: &mut Vec<String>) {
     }
 }
 
-/// Lines of a table whose columns are as wide as their widest cell; the columns of `left` are flush left, the last
-/// one is as well, the others flush right.
+/// Lines of a table whose columns are as wide as their widest cell; the columns of `left` are flush left, the others
+/// flush right.
 fn aligned(header: &[&str], left: &[usize], rows: &[Vec<String>]) -> Vec<String> {
     let header = header.iter().map(|&title| title.to_owned()).collect::<Vec<_>>();
     let all = || std::iter::once(&header).chain(rows);
@@ -173,8 +173,7 @@ fn aligned(header: &[&str], left: &[usize], rows: &[Vec<String>]) -> Vec<String>
     let widths: Vec<_> = (0..header.len()).map(width).collect();
     let cell = |(column, text): (usize, &String)| {
         let width = widths[column];
-        let is_left = left.contains(&column) || column + 1 == widths.len();
-        if is_left { format!("{text:<width$}") } else { format!("{text:>width$}") }
+        if left.contains(&column) { format!("{text:<width$}") } else { format!("{text:>width$}") }
     };
     all().map(|row| row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ")).collect()
 }
@@ -207,7 +206,8 @@ mod tests {
     fn summary(slaves: u8) -> Summary {
         let mut summary = sample::run();
         let (slave, link) = (summary.slaves[1].clone(), summary.links[0].clone());
-        summary.slaves = (3..3 + slaves).map(|address| SlaveSummary { address, ..slave.clone() }).collect();
+        summary.slaves =
+            (3..3 + slaves).map(|address| SlaveSummary { address, faults: Vec::new(), ..slave.clone() }).collect();
         summary.links = (3..3 + slaves).map(|publisher| LinkSummary { publisher, ..link.clone() }).collect();
         for (number, slave) in summary.slaves.iter_mut().step_by(10).enumerate() {
             slave.faults = vec![("0F04".to_owned(), number as u64)];
@@ -223,9 +223,9 @@ sample: master 1, 2 slaves, 1 link, 12 Mbit/s, 3 cycles in 10 s, seed 1
 T_DP 1 ms   T_DX up to 449 us, leaves 551 us   T_I 125 us   T_O 625 us   spare from 300 us
 1 fault, 2 retries
 
-slave  device   state      phase                   lock  PLL error p99     max  latch offset mean    max  faults
-    3  encoder  POWER_ON   1 configuration            -              -       -                  -      -  -
-    5  encoder  DATA_EXCH  5 operation        20 cycles          42 ns  -42 ns              45 ns  45 ns  1 x 0F04
+slave  device   state      phase                 lock  PLL error p99     max  latch offset mean    max  faults
+    3  encoder  POWER_ON   1 configuration          -              -       -                  -      -  -
+    5  encoder  DATA_EXCH  5 operation      20 cycles          42 ns  -42 ns              45 ns  45 ns  1 x 0F04
 
 latch skew: p50 90 ns, p90 90 ns, p99 90 ns, p99.9 90 ns, max 90 ns, 0.250 steps
 
@@ -251,7 +251,10 @@ fingerprint: wire 0123456789abcdef
         assert!(text.contains("the 16 worst of 100 slaves; 84 more are no worse\n"), "{text}");
         assert!(text.contains("the 8 slowest of 100 links; 92 more are no slower\n"), "{text}");
         for (number, slave) in (13..=93).step_by(10).enumerate() {
-            let line = text.lines().find(|line| line.starts_with(&format!("{slave:>5}  "))).expect("a bad slave");
+            let line = text
+                .lines()
+                .find(|line| line.starts_with(&format!("{slave:>5}  ")))
+                .unwrap_or_else(|| panic!("no {slave} in\n{text}"));
             assert!(line.ends_with(&format!("{} x 0F04", number + 1)), "{line}");
         }
     }

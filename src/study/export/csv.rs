@@ -41,7 +41,7 @@ const CYCLE_COLUMNS: &[Column<CycleRow>] = &[
     Column("t_dp_deviation_ns", |row, cell| cell.ns(row.t_dp_deviation)),
     Column("t_dx_us", |row, cell| cell.us(row.t_dx)),
     Column("latch_skew_ns", |row, cell| cell.ns(row.latch_skew)),
-    Column("skew_steps", |row, cell| row.skew_counts.into_iter().for_each(|steps| cell.put(format_args!("{steps:.6}")))),
+    Column("skew_steps", |row, cell| cell.steps(row.skew_counts)),
     Column("retries", |row, cell| cell.put(row.retries)),
     Column("acyclic_us", |row, cell| cell.us(row.acyclic)),
     Column("spare_us", |row, cell| cell.us(row.spare)),
@@ -96,10 +96,20 @@ impl Cell {
         let _ = write!(self.0, "{value}");
     }
     fn ns(&mut self, span: Option<Span>) {
-        span.into_iter().for_each(|span| self.put(Decimal::ns(span)));
+        self.some(span.map(Decimal::ns));
     }
     fn us(&mut self, span: Option<Span>) {
-        span.into_iter().for_each(|span| self.put(Decimal::us(span)));
+        self.some(span.map(Decimal::us));
+    }
+    fn steps(&mut self, steps: Option<f64>) {
+        if let Some(steps) = steps {
+            self.put(format_args!("{steps:.6}"));
+        }
+    }
+    fn some(&mut self, value: Option<impl core::fmt::Display>) {
+        if let Some(value) = value {
+            self.put(value);
+        }
     }
 }
 

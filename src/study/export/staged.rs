@@ -140,7 +140,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let mut staged = Staged::create(dir.path(), "a.txt").unwrap();
         staged.write_all(b"all of it").unwrap();
-        assert!(names(dir.path()).iter().all(|name| name.ends_with(".tmp")));
+        assert!(names(dir.path()).iter().all(|name| name.starts_with(".isodp-")));
         assert_eq!(staged.place().unwrap(), dir.path().join("a.txt"));
         assert_eq!(fs::read(dir.path().join("a.txt")).unwrap(), b"all of it");
         drop(Staged::create(dir.path(), "b.txt").unwrap());
