@@ -37,7 +37,7 @@ pub struct NetworkCounts {
     pub disturbed: u64,
     /// Observations that belong into the log of events.
     pub events: u64,
-    /// Largest latch skew in counts [steps]; none if there was no skew.
+    /// Largest latch skew in counts \[steps\]; none if there was no skew.
     pub skew_counts: Option<f64>,
 }
 

@@ -16,11 +16,11 @@ const DIGITS: u8 = 3;
 /// The distribution of one quantity of one subject.
 #[derive(Clone, Debug)]
 pub struct Histogram {
-    /// Largest magnitude [ticks] that is kept with its place.
+    /// Largest magnitude \[ticks\] that is kept with its place.
     limit: u64,
-    /// Magnitudes of values below zero [ticks]; none for an unsigned quantity.
+    /// Magnitudes of values below zero \[ticks\]; none for an unsigned quantity.
     negative: Option<hdrhistogram::Histogram<u64>>,
-    /// Values from zero up [ticks].
+    /// Values from zero up \[ticks\].
     positive: hdrhistogram::Histogram<u64>,
     below: u64,
     above: u64,
@@ -175,16 +175,16 @@ impl Histogram {
         bins
     }
 
-    /// Magnitudes of the values below zero [ticks], for export; none if the quantity is unsigned.
+    /// Magnitudes of the values below zero \[ticks\], for export; none if the quantity is unsigned.
     pub fn negative(&self) -> Option<&hdrhistogram::Histogram<u64>> {
         self.negative.as_ref()
     }
-    /// Values from zero up [ticks], for export.
+    /// Values from zero up \[ticks\], for export.
     pub fn positive(&self) -> &hdrhistogram::Histogram<u64> {
         &self.positive
     }
 
-    /// What is in range, ascending, as (middle of what cannot be told apart [ticks], count).
+    /// What is in range, ascending, as (middle of what cannot be told apart \[ticks\], count).
     fn recorded(&self) -> Vec<(i64, u64)> {
         let side = |side: &hdrhistogram::Histogram<u64>, sign: i64| {
             let place = |value| sign * side.median_equivalent(value) as i64;

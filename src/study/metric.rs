@@ -58,7 +58,7 @@ struct Watch {
     row: SlaveRow,
     /// Number of its T_I in [`Metrics::grid`].
     grid: usize,
-    /// Latch offset in counts [steps].
+    /// Latch offset in counts \[steps\].
     offset_counts: f64,
     /// The last locked latch of this cycle.
     latched: Option<Time>,

@@ -130,7 +130,7 @@ pub struct Happened {
     pub disturbed: u64,
     /// Events.
     pub events: u64,
-    /// Largest latch skew [steps].
+    /// Largest latch skew \[steps\].
     pub skew_max_steps: Option<f64>,
 }
 
