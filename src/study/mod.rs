@@ -6,3 +6,13 @@ pub mod plan;
 pub mod quantity;
 pub mod row;
 pub mod scenario;
+pub mod count;
+pub mod export;
+pub mod histogram;
+pub mod layout;
+pub mod metric;
+pub mod report;
+pub mod row;
+#[cfg(test)]
+mod sample;
+pub mod summary;
