@@ -6,6 +6,8 @@ extern crate alloc;
 pub mod fdl;
 pub mod observation;
 #[cfg(feature = "sim")]
+pub mod sim;
+#[cfg(feature = "sim")]
 pub mod study;
 pub mod time;
 pub mod wire;

@@ -1,0 +1,63 @@
+//! The recorder: everything that reads a run reads it here, and nothing that reads can change it.
+
+use super::crystal::Crystal;
+use crate::observation::Observation;
+use crate::time::Time;
+use crate::wire::Address;
+
+/// One telegram on the line, after whatever the scenario did to it.
+#[derive(Clone, Copy, Debug)]
+pub struct Transmission<'a> {
+    /// First bit at the sender.
+    pub start: Time,
+    /// Last bit at the sender.
+    pub end: Time,
+    /// Who sent it.
+    pub sender: Address,
+    /// The characters.
+    pub octets: &'a [u8],
+}
+
+/// Who saw something, and when.
+#[derive(Clone, Copy, Debug)]
+pub struct Stamp<'a> {
+    /// True time.
+    pub at: Time,
+    /// The station.
+    pub station: Address,
+    /// The station's crystal, for instants inside the observation.
+    pub crystal: &'a Crystal,
+}
+
+/// Reads a run while it happens.
+pub trait Recorder {
+    /// A telegram was put on the line. Comes when it starts.
+    fn telegram(&mut self, telegram: &Transmission<'_>);
+    /// A station observed something.
+    fn observe(&mut self, stamp: Stamp<'_>, what: &Observation);
+}
+
+impl Recorder for () {
+    fn telegram(&mut self, _: &Transmission<'_>) {}
+    fn observe(&mut self, _: Stamp<'_>, _: &Observation) {}
+}
+
+impl<A: Recorder, B: Recorder> Recorder for (A, B) {
+    fn telegram(&mut self, telegram: &Transmission<'_>) {
+        self.0.telegram(telegram);
+        self.1.telegram(telegram);
+    }
+    fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+        self.0.observe(stamp, what);
+        self.1.observe(stamp, what);
+    }
+}
+
+impl<R: Recorder> Recorder for &mut R {
+    fn telegram(&mut self, telegram: &Transmission<'_>) {
+        (**self).telegram(telegram);
+    }
+    fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+        (**self).observe(stamp, what);
+    }
+}
