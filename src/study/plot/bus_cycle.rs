@@ -134,12 +134,8 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     page(meta, &words, height, |canvas, mut area| {
         legend(canvas, &mut area, &keys);
         let top = area.top + above;
-        let plot = Area {
-            left: area.left + Lanes::NAMES,
-            top,
-            right: area.right - 24,
-            bottom: top + BUS + 12 + lanes_height,
-        };
+        let plot =
+            Area { left: area.left + Lanes::NAMES, top, right: area.right - 24, bottom: top + BUS + 12 + lanes_height };
         let start = cycle.bars.iter().map(|bar| view.us(bar.start)).fold(0.0, f64::min);
         let air = next.1 * 0.005;
         let ruler = Ruler::draw(canvas, plot, Axis::linear("time from t0 [us]", start - air, next.1 + air));

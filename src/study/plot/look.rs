@@ -51,7 +51,7 @@ pub(super) const MAX_SERIES: usize = 10;
 
 /// Colour and marker of series `index`: no two of the first fourteen agree in both.
 pub(super) fn series(index: usize) -> (RGBColor, Shape) {
-    let shape = if index / SERIES.len() % 2 == 0 { Shape::Dot } else { Shape::Square };
+    let shape = if (index / SERIES.len()).is_multiple_of(2) { Shape::Dot } else { Shape::Square };
     (SERIES[index % SERIES.len()], shape)
 }
 
@@ -165,11 +165,7 @@ impl Canvas<'_> {
         let (dx, dy) = ((to.0 - from.0).signum(), (to.1 - from.1).signum());
         for start in (0..length).step_by(2 * DASH as usize) {
             let end = (start + DASH).min(length);
-            self.path(
-                &[(from.0 + dx * start, from.1 + dy * start), (from.0 + dx * end, from.1 + dy * end)],
-                colour,
-                1,
-            );
+            self.path(&[(from.0 + dx * start, from.1 + dy * start), (from.0 + dx * end, from.1 + dy * end)], colour, 1);
         }
     }
     /// A filled polygon.

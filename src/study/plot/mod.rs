@@ -22,6 +22,8 @@ mod position;
 mod publish_latency;
 mod t_dp_deviation;
 mod telegrams;
+#[cfg(test)]
+mod tests;
 mod timeline;
 
 pub use distribution::{Distribution, Distributions, LinkLatencies};
@@ -136,12 +138,7 @@ impl Plots {
     ///
     /// # Errors
     /// [`PlotError::Draw`] before anything is written; [`PlotError::File`] with whole files only left behind.
-    pub fn write(
-        &self,
-        dir: &Path,
-        distributions: &Distributions,
-        bus: &BusCycle,
-    ) -> Result<Vec<PathBuf>, PlotError> {
+    pub fn write(&self, dir: &Path, distributions: &Distributions, bus: &BusCycle) -> Result<Vec<PathBuf>, PlotError> {
         let pictures = self.pictures(distributions, bus)?;
         let mut paths = Vec::with_capacity(pictures.len());
         for (file, text) in pictures {

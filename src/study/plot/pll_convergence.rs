@@ -136,11 +136,12 @@ fn keys_of_each(material: &Material<'_>) -> Vec<Key> {
 
 fn worst(start_ups: &[StartUp]) -> Option<usize> {
     let errors = start_ups.iter().enumerate().filter_map(|(index, start_up)| Some((index, start_up.worst()?)));
-    errors.fold(None, |worst: Option<(usize, f64)>, one| match worst {
-        Some(before) if before.1 >= one.1 => Some(before),
-        _ => Some(one),
-    })
-    .map(|worst| worst.0)
+    errors
+        .fold(None, |worst: Option<(usize, f64)>, one| match worst {
+            Some(before) if before.1 >= one.1 => Some(before),
+            _ => Some(one),
+        })
+        .map(|worst| worst.0)
 }
 
 fn lock_range(start_ups: &[StartUp]) -> Option<(usize, usize)> {

@@ -139,14 +139,7 @@ fn strips(
 }
 
 /// One strip: the mean of smallest and largest of each column, neighbours of one shade in one piece.
-fn strip(
-    canvas: &mut Canvas<'_>,
-    ruler: &Ruler,
-    lane: Area,
-    track: &Track,
-    level: impl Fn(f64) -> usize,
-    cycle: f64,
-) {
+fn strip(canvas: &mut Canvas<'_>, ruler: &Ruler, lane: Area, track: &Track, level: impl Fn(f64) -> usize, cycle: f64) {
     let each = track.points.len().div_ceil(COLUMNS).max(1);
     let cells: Vec<(u64, u64, usize)> = track
         .points

@@ -207,7 +207,8 @@ fn highest_counter(timeline: &Timeline) -> u16 {
 }
 
 fn keys(counter: Option<u16>) -> Vec<Key> {
-    let phases = PHASES.iter().map(|(phase, colour)| Key::new(format!("phase {}", phase.text()), *colour, Swatch::Fill));
+    let phases =
+        PHASES.iter().map(|(phase, colour)| Key::new(format!("phase {}", phase.text()), *colour, Swatch::Fill));
     let marks = MARKS.iter().map(|mark| Key::new(mark.label, mark.colour, Swatch::Fill));
     let trouble = Key::new("disturbance of the bus", INK, Swatch::Fill);
     let counter = counter.map(|top| {
@@ -309,9 +310,9 @@ fn counter(canvas: &mut Canvas<'_>, place: Area, buckets: &Buckets<Cell>, top: u
     let y = |counter: u16| place.bottom - i32::from(counter) * place.height() / i32::from(top.max(1));
     let cells: Vec<(u64, u16)> = buckets.iter().map(|(first, cell)| (first, cell.counter)).collect();
     for run in cells.chunk_by(|a, b| (a.1 > 0) == (b.1 > 0)).filter(|run| run[0].1 > 0) {
-        let steps = run.iter().flat_map(|&(first, counter)| {
-            [(x(first), y(counter)), (x(first + buckets.cycles_each()), y(counter))]
-        });
+        let steps = run
+            .iter()
+            .flat_map(|&(first, counter)| [(x(first), y(counter)), (x(first + buckets.cycles_each()), y(counter))]);
         let mut line: Vec<(i32, i32)> = steps.collect();
         line.dedup();
         canvas.path(&line, GREY, 1);
