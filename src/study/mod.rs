@@ -2,17 +2,17 @@
 //! threads and reports.
 
 pub mod build;
-pub mod plan;
-pub mod quantity;
-pub mod row;
-pub mod scenario;
 pub mod count;
 pub mod export;
 pub mod histogram;
 pub mod layout;
 pub mod metric;
+pub mod plan;
+pub mod plot;
+pub mod quantity;
 pub mod report;
 pub mod row;
 #[cfg(test)]
 mod sample;
+pub mod scenario;
 pub mod summary;

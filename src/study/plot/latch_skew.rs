@@ -1,0 +1,46 @@
+//! Latch skew: how far apart the slaves latch in one cycle, as a histogram over all cycles (Model: D9).
+
+use super::Material;
+use super::chart::{Axis, Chart};
+use super::look::{Area, BLUE, Key, Swatch, VERMILION, Words, empty_page, legend, page};
+
+const COLUMNS: usize = 120;
+
+/// Draws `latch_skew.svg`.
+pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
+    let skew = &material.distributions.latch_skew;
+    let mut words = Words {
+        title: "Latch skew: largest minus smallest latch instant of the locked slaves in one cycle",
+        subtitle: format!(
+            "{} cycles with at least two locked slaves, of {} slaves in all. Height: cycles per column, logarithmic.",
+            skew.count,
+            material.meta.slaves.len()
+        ),
+        plotted: "latch skew per cycle, histogram",
+    };
+    let Some((lo, hi)) = skew.range() else {
+        "Histogram over all cycles.".clone_into(&mut words.subtitle);
+        let why = "No latch skew was recorded: in no cycle were two slaves locked to the clock at once.";
+        return empty_page(material.meta, &words, why);
+    };
+    page(material.meta, &words, 560, |canvas, mut area| {
+        let keys = [
+            Key::new("cycles per column", BLUE, Swatch::Fill),
+            Key::new("percentiles and maximum", VERMILION, Swatch::Dashes),
+        ];
+        legend(canvas, &mut area, &keys);
+        let x = Axis::airy(format!("latch skew [{}]", skew.unit), lo.min(0.0), hi.max(skew.top()));
+        let counts = skew.columns(lo, if hi > lo { hi } else { lo + 1.0 }, COLUMNS);
+        let most = counts.iter().copied().fold(0.0, f64::max);
+        let outer = Area { top: area.top + 44, ..area };
+        let chart = Chart::draw(canvas, outer, x, Axis::counts("cycles (logarithmic)", most));
+        let width = if hi > lo { (hi - lo) / COLUMNS as f64 } else { 1.0 };
+        let base = chart.y(0.0);
+        for (index, &count) in counts.iter().enumerate().filter(|column| *column.1 > 0.0) {
+            let left = lo + index as f64 * width;
+            let top = chart.y(count).min(base - 1);
+            canvas.fill(Area { left: chart.x(left), top, right: chart.x(left + width), bottom: base }, BLUE);
+        }
+        chart.marks_above(canvas, skew, VERMILION);
+    })
+}

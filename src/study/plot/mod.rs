@@ -1,0 +1,198 @@
+//! Plots: the pictures of a run, each an SVG file that can be understood alone.
+//!
+//! [`Plots`] and [`BusCycle`] collect while the run goes on, in memory that does not grow with the number of cycles;
+//! [`Plots::write`] draws. The same run gives the same octets. Floating point is fine here: these are pictures, no
+//! results. One picture is one file here and one line in the registry.
+
+use std::path::{Path, PathBuf};
+
+use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
+use crate::time::Span;
+use crate::wire::Address;
+
+mod buckets;
+mod bus_cycle;
+mod chart;
+mod distribution;
+mod lanes;
+mod latch_skew;
+mod look;
+mod pll_convergence;
+mod position;
+mod publish_latency;
+mod t_dp_deviation;
+mod telegrams;
+#[cfg(test)]
+mod tests;
+mod timeline;
+
+pub use distribution::{Distribution, Distributions, LinkLatencies};
+pub use telegrams::BusCycle;
+
+/// One line of the registry.
+struct Plot {
+    file: &'static str,
+    draw: fn(&Material<'_>) -> Result<String, String>,
+}
+
+/// Every picture.
+const PLOTS: &[Plot] = &[
+    Plot { file: "latch_skew.svg", draw: latch_skew::draw },
+    Plot { file: "pll_convergence.svg", draw: pll_convergence::draw },
+    Plot { file: "t_dp_deviation.svg", draw: t_dp_deviation::draw },
+    Plot { file: "timeline.svg", draw: timeline::draw },
+    Plot { file: "publish_latency.svg", draw: publish_latency::draw },
+    Plot { file: "bus_cycle.svg", draw: bus_cycle::draw },
+    Plot { file: "position.svg", draw: position::draw },
+];
+
+/// What every picture says about the run.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct PlotMeta {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Its seed.
+    pub seed: u64,
+    /// Nominal T_DP.
+    pub t_dp: Span,
+    /// The slaves, ascending.
+    pub slaves: Vec<Address>,
+    /// The links: publisher, subscriber.
+    pub links: Vec<(Address, Address)>,
+    /// Simulated duration.
+    pub duration: Span,
+}
+
+impl PlotMeta {
+    /// Where `address` stands among the slaves.
+    fn index(&self, address: Address) -> Option<usize> {
+        self.slaves.binary_search(&address).ok()
+    }
+    /// Unit of an axis over `cycles`, and the length of a cycle in it.
+    fn time_unit(&self, cycles: u64) -> (&'static str, f64) {
+        let total = self.t_dp.as_s() * cycles as f64;
+        if total >= 10.0 { ("s", self.t_dp.as_s()) } else { ("ms", self.t_dp.as_ms()) }
+    }
+}
+
+/// Why no pictures were written.
+#[derive(Debug, thiserror::Error)]
+pub enum PlotError {
+    /// The picture could not be drawn.
+    #[error("drawing {file} failed: {reason}")]
+    Draw {
+        /// Which picture.
+        file: &'static str,
+        /// What the library said.
+        reason: String,
+    },
+    /// The file could not be written.
+    #[error("writing {} failed: {source}", .path.display())]
+    File {
+        /// Which file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+/// What a picture may look at.
+struct Material<'a> {
+    meta: &'a PlotMeta,
+    plots: &'a Plots,
+    distributions: &'a Distributions,
+    bus: &'a BusCycle,
+}
+
+/// Collects what the pictures need from the rows of a run.
+#[derive(Clone, Debug)]
+pub struct Plots {
+    meta: PlotMeta,
+    pll: pll_convergence::StartUps,
+    deviation: t_dp_deviation::Deviation,
+    timeline: timeline::Timeline,
+    position: position::Positions,
+}
+
+impl Plots {
+    /// Collectors for the slaves of `meta`.
+    pub fn new(mut meta: PlotMeta) -> Self {
+        meta.slaves.sort_unstable();
+        meta.slaves.dedup();
+        let slaves = meta.slaves.len();
+        Self {
+            pll: pll_convergence::StartUps::new(slaves),
+            deviation: t_dp_deviation::Deviation::new(),
+            timeline: timeline::Timeline::new(slaves),
+            position: position::Positions::new(slaves),
+            meta,
+        }
+    }
+
+    /// Names of the files that [`Plots::write`] makes.
+    pub fn files() -> impl Iterator<Item = &'static str> {
+        PLOTS.iter().map(|plot| plot.file)
+    }
+
+    /// Draws every picture, then writes each under a temporary name and renames it. Returns the files.
+    ///
+    /// # Errors
+    /// [`PlotError::Draw`] before anything is written; [`PlotError::File`] with whole files only left behind.
+    pub fn write(&self, dir: &Path, distributions: &Distributions, bus: &BusCycle) -> Result<Vec<PathBuf>, PlotError> {
+        let pictures = self.pictures(distributions, bus)?;
+        let mut paths = Vec::with_capacity(pictures.len());
+        for (file, text) in pictures {
+            let path = dir.join(file);
+            replace(&path, &dir.join(format!(".{file}.part")), &text)
+                .map_err(|source| PlotError::File { path: path.clone(), source })?;
+            paths.push(path);
+        }
+        Ok(paths)
+    }
+
+    /// Every picture: name of its file and its text.
+    ///
+    /// # Errors
+    /// [`PlotError::Draw`] for the first picture that could not be drawn.
+    pub fn pictures(
+        &self,
+        distributions: &Distributions,
+        bus: &BusCycle,
+    ) -> Result<Vec<(&'static str, String)>, PlotError> {
+        let material = Material { meta: &self.meta, plots: self, distributions, bus };
+        let draw = |plot: &Plot| match (plot.draw)(&material) {
+            Ok(text) => Ok((plot.file, text)),
+            Err(reason) => Err(PlotError::Draw { file: plot.file, reason }),
+        };
+        PLOTS.iter().map(draw).collect()
+    }
+}
+
+/// Writes `text` beside `path` first; a file called `path` is always whole.
+fn replace(path: &Path, part: &Path, text: &str) -> std::io::Result<()> {
+    let done = std::fs::write(part, text).and_then(|()| std::fs::rename(part, path));
+    if done.is_err() {
+        // The first error is the one to tell; a part that cannot be removed either changes nothing about it.
+        let _ = std::fs::remove_file(part);
+    }
+    done
+}
+
+impl Sink for Plots {
+    fn cycle(&mut self, row: &CycleRow) {
+        self.deviation.cycle(row);
+    }
+    fn slave(&mut self, row: &SlaveRow) {
+        if let Some(index) = self.meta.index(row.slave) {
+            self.pll.slave(index, row);
+            self.timeline.slave(index, row);
+            self.position.slave(index, row);
+        }
+    }
+    fn link(&mut self, _row: &LinkRow) {
+        // The latencies come as distributions.
+    }
+    fn event(&mut self, row: &EventRow) {
+        self.timeline.event(self.meta.index(row.station), row);
+    }
+}

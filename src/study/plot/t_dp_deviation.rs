@@ -1,0 +1,97 @@
+//! T_DP deviation: how much longer or shorter than T_DP each cycle was, over time and as a histogram.
+
+use super::Material;
+use super::buckets::{Buckets, Envelope};
+use super::chart::{Axis, Chart, short};
+use super::look::{Area, BLUE, Canvas, Font, Key, Swatch, VERMILION, Words, empty_page, legend, page, spread};
+use crate::study::row::CycleRow;
+use crate::time::Span;
+
+const COLUMNS: usize = 80;
+/// Room for the labels of the marks [px].
+const LABELS: i32 = 150;
+
+/// Smallest and largest deviation over time [ticks].
+#[derive(Clone, Debug)]
+pub(super) struct Deviation {
+    over_time: Buckets<Envelope>,
+}
+
+impl Deviation {
+    pub(super) fn new() -> Self {
+        Self { over_time: Buckets::new(1_024) }
+    }
+    /// Takes in one cycle.
+    pub(super) fn cycle(&mut self, row: &CycleRow) {
+        if let Some(deviation) = row.t_dp_deviation {
+            self.over_time.at(row.cycle).add(deviation.ticks());
+        }
+    }
+}
+
+/// Draws `t_dp_deviation.svg`.
+pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
+    let over_time = &material.plots.deviation.over_time;
+    let counted = &material.distributions.t_dp_deviation;
+    let each = over_time.cycles_each();
+    let shown = if each == 1 { "every cycle".to_owned() } else { format!("smallest and largest of {each} cycles") };
+    let words = Words {
+        title: "T_DP deviation: length of each cycle minus the nominal T_DP",
+        subtitle: format!("left: over time, {shown}; right: histogram of {} cycles, same axis.", counted.count),
+        plotted: "deviation of each cycle's length, over time and histogram",
+    };
+    if over_time.is_empty() {
+        let why = "No deviation of T_DP was recorded: the run has fewer than two complete cycles.";
+        return empty_page(material.meta, &words, why);
+    }
+    let (unit, cycle) = material.meta.time_unit(over_time.iter().last().map_or(1, |bucket| bucket.0 + each));
+    let points: Vec<(f64, f64, f64)> = over_time
+        .iter()
+        .filter_map(|(first, envelope)| {
+            let (lo, hi) = envelope.0?;
+            Some((first as f64 * cycle, Span::from_ticks(lo).as_ns(), Span::from_ticks(hi).as_ns()))
+        })
+        .collect();
+    page(material.meta, &words, 560, |canvas, mut area| {
+        let keys = [
+            Key::new(format!("deviation, {shown}"), BLUE, Swatch::Fill),
+            Key::new("percentiles and extremes", VERMILION, Swatch::Dashes),
+        ];
+        legend(canvas, &mut area, &keys);
+        let ends = points.iter().fold((0.0f64, 0.0f64), |ends, point| (ends.0.min(point.1), ends.1.max(point.2)));
+        let (lo, hi) = counted.range().map_or(ends, |range| (ends.0.min(range.0), ends.1.max(range.1)));
+        let y = Axis::airy("T_DP deviation [ns]", lo, hi);
+        let split = area.left + (area.width() - LABELS) * 13 / 20;
+        let end = points.last().map_or(cycle, |point| point.0 + cycle * each as f64);
+        let x = Axis::linear(format!("time [{unit}]"), 0.0, end);
+        let chart = Chart::draw(canvas, Area { right: split, ..area }, x, y.clone());
+        chart.band(canvas, &points, cycle * each as f64, BLUE, 0.6);
+        histogram(canvas, Area { left: split, right: area.right - LABELS, ..area }, y, material);
+    })
+}
+
+/// Level columns on the same axis, with marks at the right.
+fn histogram(canvas: &mut Canvas<'_>, outer: Area, y: Axis, material: &Material<'_>) {
+    let counted = &material.distributions.t_dp_deviation;
+    let (lo, hi) = (y.lo, y.hi);
+    let counts = counted.columns(lo, hi, COLUMNS);
+    let most = counts.iter().copied().fold(0.0, f64::max);
+    let chart = Chart::draw(canvas, outer, Axis::counts("cycles (logarithmic)", most), y);
+    let width = (hi - lo) / COLUMNS as f64;
+    for (index, &count) in counts.iter().enumerate().filter(|column| *column.1 > 0.0) {
+        let low = lo + index as f64 * width;
+        let right = chart.x(count).max(chart.area.left + 1);
+        let bar = Area { left: chart.area.left, top: chart.y(low + width), right, bottom: chart.y(low) };
+        canvas.fill(bar, BLUE);
+    }
+    let mut marks: Vec<&(String, f64)> = counted.marks.iter().collect();
+    marks.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let wanted: Vec<(i32, i32)> = marks.iter().map(|mark| (chart.y(mark.1), 18)).collect();
+    let places = spread(&wanted, chart.area.top - 8, chart.area.bottom + 30);
+    for ((label, value), place) in marks.into_iter().zip(places) {
+        let (y, right) = (chart.y(*value), chart.area.right);
+        canvas.dashes((chart.area.left, y), (right, y), VERMILION);
+        canvas.path(&[(right, y), (right + 18, place)], VERMILION, 1);
+        canvas.text((right + 22, place), &format!("{label} {} ns", short(*value)), Font::new(12).bold());
+    }
+}

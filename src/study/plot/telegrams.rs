@@ -1,0 +1,189 @@
+//! Telegrams: the last complete bus cycle as it was on the line, in two buffers of fixed size.
+
+use crate::observation::Observation;
+use crate::sim::record::{Recorder, Stamp, Transmission};
+use crate::time::Time;
+use crate::wire::{Address, FrameControl, Header, Sap, Service, Telegram};
+
+/// Most telegrams of a cycle that are kept: 122 slaves, each asked and answering four times, and some more.
+const CAPACITY: usize = 1_024;
+/// Stations with an address of their own.
+const STATIONS: usize = 127;
+/// Control_Command and Group_Select of SYNCH (Model: D5).
+const SYNCH: [u8; 2] = [0x00, 0x80];
+
+/// What a telegram is for.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(super) enum Kind {
+    Synch,
+    Request,
+    Reply,
+    DxbReply,
+    Acyclic,
+    Gap,
+    Token,
+    Unreadable,
+}
+
+/// One telegram on the line.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bar {
+    pub(super) start: Time,
+    pub(super) end: Time,
+    pub(super) kind: Kind,
+    /// Whether the station that has the token sent it.
+    pub(super) asks: bool,
+    /// The slave that it is for or from; the polled address of a GAP poll.
+    pub(super) slave: Option<Address>,
+}
+
+/// One bus cycle.
+#[derive(Clone, Debug)]
+pub(super) struct Cycle {
+    pub(super) number: Option<u64>,
+    /// The last bit of SYNCH.
+    pub(super) t0: Option<Time>,
+    /// First bit of the next SYNCH and the next t0.
+    pub(super) next: Option<(Time, Time)>,
+    pub(super) bars: Vec<Bar>,
+    /// Telegrams that found no room.
+    pub(super) dropped: u64,
+    t_o: [Option<Time>; STATIONS],
+    latch: [Option<(Time, bool)>; STATIONS],
+}
+
+impl Cycle {
+    fn new() -> Self {
+        Self {
+            number: None,
+            t0: None,
+            next: None,
+            bars: Vec::with_capacity(CAPACITY),
+            dropped: 0,
+            t_o: [None; STATIONS],
+            latch: [None; STATIONS],
+        }
+    }
+    fn clear(&mut self) {
+        (self.number, self.t0, self.next, self.dropped) = (None, None, None, 0);
+        self.bars.clear();
+        self.t_o = [None; STATIONS];
+        self.latch = [None; STATIONS];
+    }
+    fn push(&mut self, bar: Bar) {
+        if self.bars.len() < CAPACITY {
+            self.bars.push(bar);
+        } else {
+            self.dropped += 1;
+        }
+    }
+    /// How much there is to see: data exchange first, GAP second.
+    fn rank(&self) -> (bool, bool) {
+        let has = |kind: Kind| self.bars.iter().any(|bar| bar.kind == kind);
+        (has(Kind::Reply) || has(Kind::DxbReply), has(Kind::Gap))
+    }
+    /// T_O of a slave.
+    pub(super) fn t_o(&self, slave: Address) -> Option<Time> {
+        *self.t_o.get(usize::from(slave.get()))?
+    }
+    /// Latch of a slave, and whether it was at T_I of a locked clock.
+    pub(super) fn latch(&self, slave: Address) -> Option<(Time, bool)> {
+        *self.latch.get(usize::from(slave.get()))?
+    }
+}
+
+/// Keeps the telegrams, T_O and latch instants of the latest complete cycle with data exchange and a GAP poll, else of
+/// the latest with data exchange, else of the latest.
+#[derive(Clone, Debug)]
+pub struct BusCycle {
+    current: Cycle,
+    kept: Cycle,
+    /// What the last request was for, and for whom.
+    asked: (Kind, Option<Address>),
+}
+
+impl BusCycle {
+    /// Nothing kept yet.
+    pub fn new() -> Self {
+        Self { current: Cycle::new(), kept: Cycle::new(), asked: (Kind::Unreadable, None) }
+    }
+
+    /// The kept cycle.
+    pub(super) fn cycle(&self) -> Option<&Cycle> {
+        self.kept.next.map(|_| &self.kept)
+    }
+
+    /// The current cycle ends with the first bit of the next SYNCH at `start`, the next one begins at `t0`.
+    fn next(&mut self, start: Time, t0: Time) {
+        if self.current.t0.is_some() {
+            self.current.next = Some((start, t0));
+            if self.kept.next.is_none() || self.current.rank() >= self.kept.rank() {
+                core::mem::swap(&mut self.current, &mut self.kept);
+            }
+        }
+        self.current.clear();
+        self.current.t0 = Some(t0);
+    }
+
+    /// What a telegram is: its kind, whether the token holder sent it, the slave.
+    fn classify(&mut self, telegram: &Transmission<'_>) -> (Kind, bool, Option<Address>) {
+        match Telegram::parse(telegram.octets) {
+            Err(_) => (Kind::Unreadable, false, None),
+            Ok(Telegram::Token { .. }) => (Kind::Token, true, None),
+            Ok(Telegram::ShortAck) => (self.asked.0, false, Some(telegram.sender)),
+            Ok(Telegram::Data { header, du }) => match header.fc {
+                FrameControl::Response { .. } => (self.answer(&header), false, Some(telegram.sender)),
+                FrameControl::Request { service, .. } => {
+                    let kind = request(&header, service, du);
+                    let slave = (!header.da.is_broadcast()).then_some(header.da);
+                    self.asked = (if kind == Kind::Request { Kind::Reply } else { kind }, slave);
+                    (kind, true, slave)
+                }
+            },
+        }
+    }
+    fn answer(&self, header: &Header) -> Kind {
+        if header.da.is_broadcast() { Kind::DxbReply } else { self.asked.0 }
+    }
+}
+
+fn request(header: &Header, service: Service, du: &[u8]) -> Kind {
+    match (service, header.dsap) {
+        (Service::FdlStatus, _) => Kind::Gap,
+        (Service::SrdHigh | Service::Msrd, None) => Kind::Request,
+        (Service::SdnHigh, Some(Sap::GLOBAL_CONTROL)) if du == SYNCH => Kind::Synch,
+        _ => Kind::Acyclic,
+    }
+}
+
+impl Default for BusCycle {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Recorder for BusCycle {
+    fn telegram(&mut self, telegram: &Transmission<'_>) {
+        let (kind, asks, slave) = self.classify(telegram);
+        if kind == Kind::Synch {
+            self.next(telegram.start, telegram.end);
+        }
+        self.current.push(Bar { start: telegram.start, end: telegram.end, kind, asks, slave });
+    }
+
+    fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+        let station = usize::from(stamp.station.get()).min(STATIONS - 1);
+        match what {
+            Observation::CycleStart { cycle, .. } => {
+                // Without its SYNCH on the line the cycle begins all the same.
+                if self.current.t0 != Some(stamp.at) {
+                    self.next(stamp.at, stamp.at);
+                }
+                self.current.number = Some(*cycle);
+            }
+            Observation::SetPoint { .. } => self.current.t_o[station] = Some(stamp.at),
+            Observation::Latch { locked, .. } => self.current.latch[station] = Some((stamp.at, *locked)),
+            _ => {}
+        }
+    }
+}
