@@ -1,7 +1,7 @@
 //! CSV: cycles, slaves, links and events as tables for spreadsheets and data frames.
 //!
 //! The first line names the columns, with their units; a cell without value is empty. Times are exact decimals
-//! ([`Decimal`](super::decimal::Decimal)), states are words, addresses, counters, `xist1` and `xist2` are decimal numbers, `g1_zsw` is
+//! ([`Decimal`]), states are words, addresses, counters, `xist1` and `xist2` are decimal numbers, `g1_zsw` is
 //! hexadecimal (`0x1000`). Long runs are thinned by [`Thinning`]; `events.csv` keeps its first 100 000 rows. Both are
 //! stated in `summary.json` with the number of rows left out.
 
