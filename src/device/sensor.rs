@@ -214,14 +214,8 @@ pub struct Answer {
 
 impl Answer {
     /// What is answered before the first cycle.
-    pub const NONE: Self = Self {
-        zsw: 0,
-        xist1: Xist1::Position,
-        xist2: Xist2::Zero,
-        preset: None,
-        latched: Faults::NONE,
-        cleared: None,
-    };
+    pub const NONE: Self =
+        Self { zsw: 0, xist1: Xist1::Position, xist2: Xist2::Zero, preset: None, latched: Faults::NONE, cleared: None };
 }
 
 /// Latched faults, each at most once, the first latched in front.

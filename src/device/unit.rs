@@ -202,12 +202,32 @@ impl<F: Function> Body<F> {
         let range = units(self.profile.t_dp_min)..=units(self.profile.t_dp_max);
         let rules = [
             (9, t_dp, range.contains(&t_dp), "T_DP [1/12 us] is within the device's range (manual 3.3.2)"),
-            (16, t_i, t_i >= units(self.profile.t_i_min(slow)), "T_I [1/12 us] is 125 us or more, 375 us with octet 15 bit 1 (manual 3.3.5)"),
+            (
+                16,
+                t_i,
+                t_i >= units(self.profile.t_i_min(slow)),
+                "T_I [1/12 us] is 125 us or more, 375 us with octet 15 bit 1 (manual 3.3.5)",
+            ),
             (16, t_i, t_i < t_dp, "T_I [1/12 us] is less than T_DP (manual 3.3.5)"),
-            (18, t_o, t_o > t_dx + units(self.profile.t_o_min), "T_O [1/12 us] is more than T_DX + T_O_MIN (manual 3.3.6)"),
+            (
+                18,
+                t_o,
+                t_o > t_dx + units(self.profile.t_o_min),
+                "T_O [1/12 us] is more than T_DX + T_O_MIN (manual 3.3.6)",
+            ),
             (18, t_o, t_o < t_dp, "T_O [1/12 us] is less than T_DP (Model: D3)"),
-            (18, t_o, t_o + t_i + gap <= t_dp, "T_O [1/12 us] is 125 us or more before the latch, 375 us with octet 15 bit 1 (manual 3.3.6)"),
-            (24, u64::from(iso.t_pll_w), iso.t_pll_w <= self.profile.t_pll_w_max, "T_PLL_W [1/12 us] is not above T_PLL_W_MAX (GSD)"),
+            (
+                18,
+                t_o,
+                t_o + t_i + gap <= t_dp,
+                "T_O [1/12 us] is 125 us or more before the latch, 375 us with octet 15 bit 1 (manual 3.3.6)",
+            ),
+            (
+                24,
+                u64::from(iso.t_pll_w),
+                iso.t_pll_w <= self.profile.t_pll_w_max,
+                "T_PLL_W [1/12 us] is not above T_PLL_W_MAX (GSD)",
+            ),
         ];
         match rules.into_iter().find(|&(.., good, _)| !good) {
             Some((offset, value, _, rule)) => Err(Refusal::Device { octet: block.octet + offset, rule, value }),
@@ -244,9 +264,9 @@ impl<F: Function> Application for Body<F> {
     fn parameterise(&mut self, prm: &SetPrm<'_>) {
         let watchdog = prm.watchdog_units().map(|n| Span::from_ms(i64::from(n) * i64::from(prm.watchdog_base_ms())));
         let iso = iso_block(prm).ok().flatten().filter(|_| prm.dpv1.isom_req());
-        self.iso = iso.and_then(|block| IsoM::parse(&block).ok()).map(|iso| {
-            Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), self.clock_tolerance))
-        });
+        self.iso = iso
+            .and_then(|block| IsoM::parse(&block).ok())
+            .map(|iso| Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), self.clock_tolerance)));
         self.function.parameterise(prm, watchdog);
     }
     fn enter(&mut self, _now: Local, out: &mut Outbox) {

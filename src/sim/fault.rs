@@ -82,7 +82,9 @@ impl Service {
                 Ok(Telegram::Data { header, .. }) => {
                     header.dsap.is_none()
                         && match header.fc {
-                            FrameControl::Request { service, .. } => !matches!(service, wire::Service::FdlStatus | wire::Service::Ident),
+                            FrameControl::Request { service, .. } => {
+                                !matches!(service, wire::Service::FdlStatus | wire::Service::Ident)
+                            }
                             FrameControl::Response { .. } => true,
                         }
                 }

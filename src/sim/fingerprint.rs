@@ -99,9 +99,10 @@ impl Fingerprints {
     }
     /// Fingerprints of each station that was ever seen, in the order of addresses.
     pub fn stations(&self) -> impl Iterator<Item = (Address, Fingerprint)> {
-        self.stations.iter().enumerate().filter_map(|(address, station)| {
-            Some((Address::new(address as u8)?, station.as_ref()?.fingerprint()))
-        })
+        self.stations
+            .iter()
+            .enumerate()
+            .filter_map(|(address, station)| Some((Address::new(address as u8)?, station.as_ref()?.fingerprint())))
     }
     /// The network's fingerprint.
     pub fn total(&self) -> Fingerprint {

@@ -8,7 +8,7 @@ pub mod crystal;
 pub mod fault;
 pub mod fingerprint;
 pub mod motion;
-pub mod noise;
 pub mod network;
+pub mod noise;
 pub mod queue;
 pub mod record;

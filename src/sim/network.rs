@@ -299,9 +299,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         deadline.due = None;
         let input = match Timer::ALL.get(which) {
-            Some(&timer) => {
-                Input::Deadline { timer, busy: timer == Timer::Slot && self.bus.is_busy(now, self.slots[slot].site.place) }
-            }
+            Some(&timer) => Input::Deadline {
+                timer,
+                busy: timer == Timer::Slot && self.bus.is_busy(now, self.slots[slot].site.place),
+            },
             None => Input::Sample(self.raw(slot)),
         };
         self.step(slot, local, input, recorder);
@@ -369,8 +370,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             start += jitter;
             end += jitter;
         }
-        let lost =
-            self.disturbances.iter().any(|what| what.loses(self.clocks_begun(send.clock), address, send.clock, frame.octets()));
+        let lost = self
+            .disturbances
+            .iter()
+            .any(|what| what.loses(self.clocks_begun(send.clock), address, send.clock, frame.octets()));
         if send.clock {
             // The master's transmitter runs, whatever becomes of the telegram.
             self.push(end, Phase::Edge, slot, Event::Sent);
@@ -412,7 +415,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                     heard |= self.deliver_to(self.hear_publishers[index].into(), sender, id, end, route);
                 }
                 let addressed = route.and_then(|route| self.by_address[usize::from(route.da)]);
-                if let Some(listener) = addressed.filter(|slot| !self.hear_all.contains(slot) && !self.hear_publishers.contains(slot)) {
+                if let Some(listener) =
+                    addressed.filter(|slot| !self.hear_all.contains(slot) && !self.hear_publishers.contains(slot))
+                {
                     heard |= self.deliver_to(listener.into(), sender, id, end, route);
                 }
             }

@@ -53,6 +53,15 @@ impl<A: Recorder, B: Recorder> Recorder for (A, B) {
     }
 }
 
+impl<R: Recorder> Recorder for Option<R> {
+    fn telegram(&mut self, telegram: &Transmission<'_>) {
+        self.iter_mut().for_each(|recorder| recorder.telegram(telegram));
+    }
+    fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+        self.iter_mut().for_each(|recorder| recorder.observe(stamp, what));
+    }
+}
+
 impl<R: Recorder> Recorder for &mut R {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
         (**self).telegram(telegram);

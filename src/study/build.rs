@@ -285,7 +285,12 @@ mod tests {
                 life_start: 1,
             },
             slaves,
-            links: vec![Link { publisher: Address::new(3).unwrap(), subscriber: Address::new(11).unwrap(), offset: 4, length: 4 }],
+            links: vec![Link {
+                publisher: Address::new(3).unwrap(),
+                subscriber: Address::new(11).unwrap(),
+                offset: 4,
+                length: 4,
+            }],
             events: vec![],
             disturbances: vec![],
             record: Record { files: false, plots: false, tables: vec![], rows: 1 },

@@ -12,6 +12,7 @@ pub mod plot;
 pub mod quantity;
 pub mod report;
 pub mod row;
+pub mod run;
 #[cfg(test)]
 mod sample;
 pub mod scenario;

@@ -131,6 +131,20 @@ impl<A: Sink, B: Sink> Sink for (A, B) {
     }
 }
 impl Sink for () {}
+impl<S: Sink> Sink for Option<S> {
+    fn cycle(&mut self, row: &CycleRow) {
+        self.iter_mut().for_each(|sink| sink.cycle(row));
+    }
+    fn slave(&mut self, row: &SlaveRow) {
+        self.iter_mut().for_each(|sink| sink.slave(row));
+    }
+    fn link(&mut self, row: &LinkRow) {
+        self.iter_mut().for_each(|sink| sink.link(row));
+    }
+    fn event(&mut self, row: &EventRow) {
+        self.iter_mut().for_each(|sink| sink.event(row));
+    }
+}
 impl<S: Sink + ?Sized> Sink for &mut S {
     fn cycle(&mut self, row: &CycleRow) {
         (**self).cycle(row);

@@ -418,6 +418,8 @@ pub enum CsvTable {
 }
 
 impl CsvTable {
+    /// Every table.
+    pub const EVERY: &'static [Self] = &[Self::Cycles, Self::Slaves, Self::Links, Self::Events];
     /// Every table with the key that switches it on and off.
     pub const ALL: &'static [(&'static str, Self)] = &[
         ("cycles_csv", Self::Cycles),

@@ -12,8 +12,8 @@ use super::staged::{ExportError, Staged};
 use super::thinning::Thinning;
 use super::{Export, Exporter, Target};
 use crate::study::histogram::Histograms;
-use crate::study::layout::Layout;
 use crate::study::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
+use crate::study::scenario::CsvTable;
 use crate::study::summary::Summary;
 use crate::time::Span;
 
@@ -156,63 +156,106 @@ impl<R> Table<R> {
     }
 }
 
+/// A table that long runs thin, if it is wanted.
+type Thinned<R> = Option<(Table<R>, Thinning)>;
+
 /// All tables of one run.
 struct Tables {
-    cycles: (Table<CycleRow>, Thinning),
-    slaves: (Table<SlaveRow>, Thinning),
-    links: (Table<LinkRow>, Thinning),
-    events: Table<EventRow>,
+    cycles: Thinned<CycleRow>,
+    slaves: Thinned<SlaveRow>,
+    links: Thinned<LinkRow>,
+    events: Option<Table<EventRow>>,
     events_seen: u64,
 }
 
-fn names(_: &Layout) -> Vec<String> {
-    [CYCLES, SLAVES, LINKS, EVENTS].map(str::to_owned).into()
+/// The file of a table.
+const fn file(table: CsvTable) -> &'static str {
+    match table {
+        CsvTable::Cycles => CYCLES,
+        CsvTable::Slaves => SLAVES,
+        CsvTable::Links => LINKS,
+        CsvTable::Events => EVENTS,
+    }
+}
+
+fn names(target: &Target<'_>) -> Vec<String> {
+    target.tables.iter().map(|&table| file(table).to_owned()).collect()
 }
 
 fn open(target: &Target<'_>) -> Result<Box<dyn Export>, ExportError> {
-    let create = |name| Staged::create(target.dir, name);
-    let thinning = |name, rows: usize| Thinning::new(name, target.rows, target.cycles, rows as u64);
+    let (slaves, links) = (target.layout.slaves().len(), target.layout.links().len());
+    let events = target.tables.contains(&CsvTable::Events);
     Ok(Box::new(Tables {
-        cycles: (Table::new(create(CYCLES)?, CYCLE_COLUMNS), thinning(CYCLES, 1)),
-        slaves: (Table::new(create(SLAVES)?, SLAVE_COLUMNS), thinning(SLAVES, target.layout.slaves().len())),
-        links: (Table::new(create(LINKS)?, LINK_COLUMNS), thinning(LINKS, target.layout.links().len())),
-        events: Table::new(create(EVENTS)?, EVENT_COLUMNS),
+        cycles: thinned(target, CsvTable::Cycles, CYCLE_COLUMNS, 1)?,
+        slaves: thinned(target, CsvTable::Slaves, SLAVE_COLUMNS, slaves)?,
+        links: thinned(target, CsvTable::Links, LINK_COLUMNS, links)?,
+        events: if events { Some(Table::new(Staged::create(target.dir, EVENTS)?, EVENT_COLUMNS)) } else { None },
         events_seen: 0,
     }))
 }
 
+/// Begins `table` if it is wanted; it has `rows` rows per cycle.
+fn thinned<R>(
+    target: &Target<'_>,
+    table: CsvTable,
+    columns: &'static [Column<R>],
+    rows: usize,
+) -> Result<Thinned<R>, ExportError> {
+    if !target.tables.contains(&table) {
+        return Ok(None);
+    }
+    let name = file(table);
+    let thinning = Thinning::new(name, target.rows, target.cycles, rows as u64);
+    Ok(Some((Table::new(Staged::create(target.dir, name)?, columns), thinning)))
+}
+
+/// Writes `row` of `cycle` if it is not thinned out.
+fn put<R>(table: &mut Thinned<R>, cycle: u64, row: &R) {
+    if let Some((table, thinning)) = table
+        && thinning.keeps(cycle)
+    {
+        table.row(row);
+    }
+}
+
+impl Tables {
+    fn thinnings(&mut self) -> impl Iterator<Item = &mut Thinning> {
+        let cycles = self.cycles.as_mut().map(|table| &mut table.1);
+        let slaves = self.slaves.as_mut().map(|table| &mut table.1);
+        let links = self.links.as_mut().map(|table| &mut table.1);
+        [cycles, slaves, links].into_iter().flatten()
+    }
+}
+
 impl Sink for Tables {
     fn cycle(&mut self, row: &CycleRow) {
-        if self.cycles.1.keeps(row.cycle) {
-            self.cycles.0.row(row);
-        }
+        put(&mut self.cycles, row.cycle, row);
     }
     fn slave(&mut self, row: &SlaveRow) {
-        if self.slaves.1.keeps(row.cycle) {
-            self.slaves.0.row(row);
-        }
+        put(&mut self.slaves, row.cycle, row);
     }
     fn link(&mut self, row: &LinkRow) {
-        if self.links.1.keeps(row.cycle) {
-            self.links.0.row(row);
-        }
+        put(&mut self.links, row.cycle, row);
     }
     fn event(&mut self, row: &EventRow) {
-        for thinning in [&mut self.cycles.1, &mut self.slaves.1, &mut self.links.1] {
-            thinning.event(row.cycle);
-        }
-        if self.events_seen < EVENT_ROWS {
-            self.events.row(row);
+        self.thinnings().for_each(|thinning| thinning.event(row.cycle));
+        if let Some(events) = &mut self.events
+            && self.events_seen < EVENT_ROWS
+        {
+            events.row(row);
         }
         self.events_seen += 1;
     }
 }
 
 impl Export for Tables {
-    fn close(self: Box<Self>, _: &Histograms, summary: &mut Summary) -> Result<Vec<Staged>, ExportError> {
-        summary.thinning = vec![self.cycles.1, self.slaves.1, self.links.1];
-        summary.events_left_out = self.events_seen.saturating_sub(EVENT_ROWS);
-        Ok(vec![self.cycles.0.close()?, self.slaves.0.close()?, self.links.0.close()?, self.events.close()?])
+    fn close(mut self: Box<Self>, _: &Histograms, summary: &mut Summary) -> Result<Vec<Staged>, ExportError> {
+        summary.thinning = self.thinnings().map(|thinning| thinning.clone()).collect();
+        summary.events_left_out = self.events.as_ref().map_or(0, |_| self.events_seen.saturating_sub(EVENT_ROWS));
+        let cycles = self.cycles.map(|table| table.0.close());
+        let slaves = self.slaves.map(|table| table.0.close());
+        let links = self.links.map(|table| table.0.close());
+        [cycles, slaves, links, self.events.map(Table::close)].into_iter().flatten().collect()
     }
 }
 
@@ -231,7 +274,8 @@ mod tests {
     fn written(rows: u64, cycles: u64, feed: impl Fn(&mut dyn Export)) -> (tempfile::TempDir, Vec<Staged>, Summary) {
         let dir = tempfile::tempdir().unwrap();
         let layout = sample::layout();
-        let mut tables = open(&Target { dir: dir.path(), layout: &layout, cycles, rows }).unwrap();
+        let mut tables =
+            open(&Target { dir: dir.path(), layout: &layout, cycles, rows, tables: CsvTable::EVERY }).unwrap();
         feed(tables.as_mut());
         let mut summary = sample::summary();
         let files = tables.close(&Histograms::new(&layout), &mut summary).unwrap();

@@ -38,8 +38,8 @@ fn name(quantity: &Quantity) -> String {
     format!("{}.hlog", quantity.name)
 }
 
-fn names(layout: &Layout) -> Vec<String> {
-    quantities(layout).map(name).collect()
+fn names(target: &Target<'_>) -> Vec<String> {
+    quantities(target.layout).map(name).collect()
 }
 
 fn open(target: &Target<'_>) -> Result<Box<dyn Export>, ExportError> {
@@ -113,6 +113,7 @@ fn write_subject(log: &mut Log<'_>, subject: Subject, histogram: &Histogram, dur
 mod tests {
     use super::*;
     use crate::study::sample;
+    use crate::study::scenario::CsvTable;
     use hdrhistogram::serialization::Deserializer;
     use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
     use std::collections::BTreeMap;
@@ -136,7 +137,9 @@ mod tests {
     /// Writes `histograms` and reads the log of `quantity` back, by tag.
     fn read_back(histograms: &Histograms, quantity: &str) -> (BTreeMap<String, hdrhistogram::Histogram<u64>>, String) {
         let dir = tempfile::tempdir().unwrap();
-        let logs = open(&Target { dir: dir.path(), layout: histograms.layout(), cycles: 1, rows: 1 }).unwrap();
+        let logs =
+            open(&Target { dir: dir.path(), layout: histograms.layout(), cycles: 1, rows: 1, tables: CsvTable::EVERY })
+                .unwrap();
         Staged::place_all(logs.close(histograms, &mut sample::summary()).unwrap()).unwrap();
         let text = std::fs::read_to_string(dir.path().join(format!("{quantity}.hlog"))).unwrap();
         let mut read = BTreeMap::new();

@@ -5,7 +5,6 @@ use std::io::{BufWriter, Write};
 use super::staged::{ExportError, Staged};
 use super::{Export, Exporter, Target};
 use crate::study::histogram::Histograms;
-use crate::study::layout::Layout;
 use crate::study::row::Sink;
 use crate::study::summary::Summary;
 
@@ -16,7 +15,7 @@ const SUMMARY: &str = "summary.json";
 
 struct Json(Staged);
 
-fn names(_: &Layout) -> Vec<String> {
+fn names(_: &Target<'_>) -> Vec<String> {
     vec![SUMMARY.to_owned()]
 }
 
@@ -46,11 +45,13 @@ impl Export for Json {
 mod tests {
     use super::*;
     use crate::study::sample;
+    use crate::study::scenario::CsvTable;
     use serde_json::Value;
 
     fn written() -> String {
         let (dir, layout) = (tempfile::tempdir().unwrap(), sample::layout());
-        let json = open(&Target { dir: dir.path(), layout: &layout, cycles: 3, rows: 10 }).unwrap();
+        let json =
+            open(&Target { dir: dir.path(), layout: &layout, cycles: 3, rows: 10, tables: CsvTable::EVERY }).unwrap();
         Staged::place_all(json.close(&Histograms::new(&layout), &mut sample::run()).unwrap()).unwrap();
         std::fs::read_to_string(dir.path().join(SUMMARY)).unwrap()
     }

@@ -18,6 +18,7 @@ pub use staged::{ExportError, Staged};
 use super::histogram::Histograms;
 use super::layout::Layout;
 use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
+use super::scenario::CsvTable;
 use super::summary::Summary;
 
 /// What a run will be and where its files go.
@@ -31,11 +32,8 @@ pub struct Target<'a> {
     pub cycles: u64,
     /// How many rows a table may have before it is thinned.
     pub rows: u64,
-}
-
-impl Target<'_> {
-    /// Rows per table that spreadsheets still open.
-    pub const ROWS: u64 = 1_000_000;
+    /// Which tables are wanted.
+    pub tables: &'a [CsvTable],
 }
 
 /// One exporter at work: it takes rows during the run and hands over its files at the end.
@@ -54,8 +52,8 @@ pub struct Exporter {
     pub name: &'static str,
     /// What it writes, for people.
     pub what: &'static str,
-    /// The names of its files for a network.
-    pub files: fn(&Layout) -> Vec<String>,
+    /// The names of its files.
+    pub files: fn(&Target<'_>) -> Vec<String>,
     /// Begins its files.
     pub open: fn(&Target<'_>) -> Result<Box<dyn Export>, ExportError>,
 }
@@ -78,7 +76,7 @@ impl Exports {
         fs::create_dir_all(target.dir)
             .map_err(|source| ExportError::Directory { path: target.dir.to_owned(), source })?;
         let open = exporters.iter().map(|exporter| (exporter.open)(target)).collect::<Result<_, _>>()?;
-        let names = exporters.iter().flat_map(|exporter| (exporter.files)(target.layout)).collect();
+        let names = exporters.iter().flat_map(|exporter| (exporter.files)(target)).collect();
         Ok(Self { open, names })
     }
 
@@ -87,7 +85,7 @@ impl Exports {
     /// # Errors
     /// The first one of the whole run; no file stays then.
     pub fn finish(self, histograms: &Histograms, summary: &mut Summary) -> Result<Vec<PathBuf>, ExportError> {
-        summary.files = self.names;
+        summary.files.extend(self.names);
         let mut staged = Vec::new();
         for export in self.open {
             staged.extend(export.close(histograms, summary)?);
@@ -128,7 +126,9 @@ mod tests {
     }
     fn fed(dir: &Path) -> Exports {
         let layout = sample::layout();
-        let mut exports = Exports::open(&Target { dir, layout: &layout, cycles: 3, rows: 100 }, EXPORTERS).unwrap();
+        let mut exports =
+            Exports::open(&Target { dir, layout: &layout, cycles: 3, rows: 100, tables: CsvTable::EVERY }, EXPORTERS)
+                .unwrap();
         for cycle in 0..3 {
             exports.event(&sample::event(cycle));
             exports.cycle(&sample::cycle(cycle));
@@ -182,7 +182,7 @@ mod tests {
         assert_eq!(names(dir.path()), BTreeSet::from(["summary.json".to_owned()]));
         let file = dir.path().join("file");
         fs::write(&file, "").unwrap();
-        let target = Target { dir: &file, layout: &sample::layout(), cycles: 3, rows: 100 };
+        let target = Target { dir: &file, layout: &sample::layout(), cycles: 3, rows: 100, tables: CsvTable::EVERY };
         assert!(matches!(Exports::open(&target, EXPORTERS), Err(ExportError::Directory { .. })));
     }
 }

@@ -129,15 +129,30 @@ fn print_all() {
         ("position = \"10 m\"", "position = \"10 m\"\nt_pll_w = \"100 ns\""),
         ("position = \"10 m\"", "position = \"10 m\"\nt_pll_w = \"100 us\""),
         ("position = \"10 m\"", "position = \"10 m\"\nscaling = { units_per_rev = 9000, total_range = 1 }"),
-        ("position = \"10 m\"", "position = \"10 m\"\nt_i=\"375 us\"\nscaling = { units_per_rev = 100, total_range = 500000 }"),
+        (
+            "position = \"10 m\"",
+            "position = \"10 m\"\nt_i=\"375 us\"\nscaling = { units_per_rev = 100, total_range = 500000 }",
+        ),
         ("position = \"10 m\"", "position = \"10 m\"\ncode_sequence = \"ccw\""),
         ("duration = \"20 s\"", "duration = \"0 s\""),
         ("duration = \"20 s\"", "cycles = 1000000000000"),
     ] {
         println!("--- {from} -> {to}\n{}\n", said(from, to));
     }
-    for (key, value) in [("master.t_o", "0.5 ms"), ("slave.3.crystal", "20 pmp"), ("slave.9.crystal", "2 ppm"),
-     ("master.x", "1"), ("foo", "1"), ("link.2.length", "1"), ("master.watchdog", "2570 ms"), ("master.watchdog","0 ms"), ("bus.t_sl", "100 tbit"), ("bus.max_tsdr", "100 tbit"), ("bus.hsa","10"), ("record","5")] {
+    for (key, value) in [
+        ("master.t_o", "0.5 ms"),
+        ("slave.3.crystal", "20 pmp"),
+        ("slave.9.crystal", "2 ppm"),
+        ("master.x", "1"),
+        ("foo", "1"),
+        ("link.2.length", "1"),
+        ("master.watchdog", "2570 ms"),
+        ("master.watchdog", "0 ms"),
+        ("bus.t_sl", "100 tbit"),
+        ("bus.max_tsdr", "100 tbit"),
+        ("bus.hsa", "10"),
+        ("record", "5"),
+    ] {
         println!("--- {key}={value}\n{}\n", said_of_set(key, value));
     }
 }
