@@ -95,16 +95,12 @@ impl Isochronous {
         let before = self.pll.state();
         let life = self.life.state();
         *self = Self { phase: self.phase, ..Self::new(self.settings) };
-        self.stop(out);
+        stop(out);
         out.disarm(Timer::Window);
         out.sample_with_telegrams(false);
         self.observe_pll(before, out);
         self.observe_life(life, out);
         self.enter_phase(Phase::Configuration, out);
-    }
-    fn stop(&mut self, out: &mut Outbox) {
-        out.disarm(Timer::SetPoint);
-        out.cancel_sample();
     }
     /// The master said Operate or Clear. Clear does not stop the clock.
     pub fn operate(&mut self, operate: bool) {
@@ -174,7 +170,7 @@ impl Isochronous {
         self.life.reset();
         self.own.cycle(false);
         self.observe_life(life, out);
-        self.stop(out);
+        stop(out);
         out.sample_with_telegrams(true);
         self.enter_phase(Phase::Clock, out);
     }
@@ -220,4 +216,10 @@ impl Isochronous {
             out.observe(Observation::MasterLife { from, to });
         }
     }
+}
+
+/// T_O and the latch run no more.
+fn stop(out: &mut Outbox) {
+    out.disarm(Timer::SetPoint);
+    out.cancel_sample();
 }

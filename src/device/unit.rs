@@ -197,29 +197,25 @@ impl<F: Function> Body<F> {
         let iso = IsoM::parse(block)?;
         iso.check(block.octet)?;
         let units = |span: Span| (span.ticks() / Span::TICKS_PER_ISO_UNIT) as u64;
-        let (t_dp, t_i, t_o, t_dx) = (iso.t_dp_units(), iso.t_i_units(), iso.t_o_units(), u64::from(iso.t_dx));
+        let (t_dp, latch, set_point) = (iso.t_dp_units(), iso.t_i_units(), iso.t_o_units());
+        let earliest = u64::from(iso.t_dx) + units(self.profile.t_o_min);
         let gap = units(self.profile.gap_min(slow));
         let range = units(self.profile.t_dp_min)..=units(self.profile.t_dp_max);
         let rules = [
             (9, t_dp, range.contains(&t_dp), "T_DP [1/12 us] is within the device's range (manual 3.3.2)"),
             (
                 16,
-                t_i,
-                t_i >= units(self.profile.t_i_min(slow)),
+                latch,
+                latch >= units(self.profile.t_i_min(slow)),
                 "T_I [1/12 us] is 125 us or more, 375 us with octet 15 bit 1 (manual 3.3.5)",
             ),
-            (16, t_i, t_i < t_dp, "T_I [1/12 us] is less than T_DP (manual 3.3.5)"),
+            (16, latch, latch < t_dp, "T_I [1/12 us] is less than T_DP (manual 3.3.5)"),
+            (18, set_point, set_point > earliest, "T_O [1/12 us] is more than T_DX + T_O_MIN (manual 3.3.6)"),
+            (18, set_point, set_point < t_dp, "T_O [1/12 us] is less than T_DP (Model: D3)"),
             (
                 18,
-                t_o,
-                t_o > t_dx + units(self.profile.t_o_min),
-                "T_O [1/12 us] is more than T_DX + T_O_MIN (manual 3.3.6)",
-            ),
-            (18, t_o, t_o < t_dp, "T_O [1/12 us] is less than T_DP (Model: D3)"),
-            (
-                18,
-                t_o,
-                t_o + t_i + gap <= t_dp,
+                set_point,
+                set_point + latch + gap <= t_dp,
                 "T_O [1/12 us] is 125 us or more before the latch, 375 us with octet 15 bit 1 (manual 3.3.6)",
             ),
             (

@@ -97,9 +97,8 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     slots: Vec<Slot<S>>,
     /// Slot of each address.
     by_address: [Option<u8>; 128],
-    /// Slots that hear everything, and those that hear publishers.
-    hear_all: Vec<u8>,
-    hear_publishers: Vec<u8>,
+    /// Slots that hear more than what is for them or for everybody.
+    curious: Vec<u8>,
     bus: Bus,
     queue: Q,
     jitter: JitterSource,
@@ -146,8 +145,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             rate,
             slots,
             by_address,
-            hear_all: Vec::new(),
-            hear_publishers: Vec::new(),
+            curious: Vec::new(),
             bus: Bus::default(),
             queue: Q::default(),
             jitter,
@@ -198,22 +196,16 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Runs for at most `budget` events. Tells whether `until` is reached.
     pub fn run<R: Recorder>(&mut self, until: Until, budget: u64, recorder: &mut R) -> bool {
         for _ in 0..budget {
-            let (Until::Time(end), Some(key)) = (until, self.queue.peek()) else {
-                match until {
-                    Until::Cycle(cycle) if self.clocks <= cycle => {
-                        if !self.next(recorder) {
-                            return true;
-                        }
-                        continue;
-                    }
-                    _ => return true,
-                }
+            let over = match until {
+                Until::Cycle(cycle) => self.clocks > cycle,
+                Until::Time(end) => self.queue.peek().is_none_or(|key| key.time() > end),
             };
-            if key.time() > end {
-                self.now = end;
+            if over || !self.next(recorder) {
+                if let Until::Time(end) = until {
+                    self.now = end;
+                }
                 return true;
             }
-            self.next(recorder);
         }
         false
     }
@@ -277,8 +269,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     fn sent<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
         let cycle = self.clocks;
         self.clocks += 1;
-        while let Some(&(due, act)) = self.cycle_acts.get(self.next_cycle_act).filter(|&&(due, _)| due <= cycle) {
-            debug_assert!(due <= cycle);
+        while let Some(&(_, act)) = self.cycle_acts.get(self.next_cycle_act).filter(|&&(due, _)| due <= cycle) {
             self.next_cycle_act += 1;
             self.act(act, recorder);
         }
@@ -401,25 +392,17 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     fn deliver(&mut self, sender: usize, id: FlightId, end: Time) {
         let route = Route::of(self.bus.flight(id).frame.octets());
         let mut heard = false;
-        match route {
-            Some(Route { da: Route::TO_ALL, reply: false, .. }) => {
-                for listener in 0..self.slots.len() {
-                    heard |= self.deliver_to(listener, sender, id, end, route);
-                }
+        if matches!(route, Some(Route { da: Route::TO_ALL, reply: false, .. })) {
+            for listener in 0..self.slots.len() {
+                heard |= self.deliver_to(listener, sender, id, end, route);
             }
-            _ => {
-                for index in 0..self.hear_all.len() {
-                    heard |= self.deliver_to(self.hear_all[index].into(), sender, id, end, route);
-                }
-                for index in 0..self.hear_publishers.len() {
-                    heard |= self.deliver_to(self.hear_publishers[index].into(), sender, id, end, route);
-                }
-                let addressed = route.and_then(|route| self.by_address[usize::from(route.da)]);
-                if let Some(listener) =
-                    addressed.filter(|slot| !self.hear_all.contains(slot) && !self.hear_publishers.contains(slot))
-                {
-                    heard |= self.deliver_to(listener.into(), sender, id, end, route);
-                }
+        } else {
+            for index in 0..self.curious.len() {
+                heard |= self.deliver_to(self.curious[index].into(), sender, id, end, route);
+            }
+            let addressed = route.and_then(|route| self.by_address[usize::from(route.da)]);
+            if let Some(listener) = addressed.filter(|slot| !self.curious.contains(slot)) {
+                heard |= self.deliver_to(listener.into(), sender, id, end, route);
             }
         }
         if !heard {
@@ -436,14 +419,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         true
     }
     fn sort_listeners(&mut self) {
-        self.hear_all.clear();
-        self.hear_publishers.clear();
-        for (index, slot) in self.slots.iter().enumerate() {
-            if slot.filter.all {
-                self.hear_all.push(index as u8);
-            } else if slot.filter.publishers != 0 {
-                self.hear_publishers.push(index as u8);
-            }
-        }
+        self.curious.clear();
+        let curious =
+            |(index, slot): (usize, &Slot<S>)| (slot.filter.all || slot.filter.publishers != 0).then_some(index as u8);
+        self.curious.extend(self.slots.iter().enumerate().filter_map(curious));
     }
 }

@@ -55,10 +55,14 @@ impl<A: Recorder, B: Recorder> Recorder for (A, B) {
 
 impl<R: Recorder> Recorder for Option<R> {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
-        self.iter_mut().for_each(|recorder| recorder.telegram(telegram));
+        if let Some(recorder) = self {
+            recorder.telegram(telegram);
+        }
     }
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
-        self.iter_mut().for_each(|recorder| recorder.observe(stamp, what));
+        if let Some(recorder) = self {
+            recorder.observe(stamp, what);
+        }
     }
 }
 

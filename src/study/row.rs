@@ -133,16 +133,24 @@ impl<A: Sink, B: Sink> Sink for (A, B) {
 impl Sink for () {}
 impl<S: Sink> Sink for Option<S> {
     fn cycle(&mut self, row: &CycleRow) {
-        self.iter_mut().for_each(|sink| sink.cycle(row));
+        if let Some(sink) = self {
+            sink.cycle(row);
+        }
     }
     fn slave(&mut self, row: &SlaveRow) {
-        self.iter_mut().for_each(|sink| sink.slave(row));
+        if let Some(sink) = self {
+            sink.slave(row);
+        }
     }
     fn link(&mut self, row: &LinkRow) {
-        self.iter_mut().for_each(|sink| sink.link(row));
+        if let Some(sink) = self {
+            sink.link(row);
+        }
     }
     fn event(&mut self, row: &EventRow) {
-        self.iter_mut().for_each(|sink| sink.event(row));
+        if let Some(sink) = self {
+            sink.event(row);
+        }
     }
 }
 impl<S: Sink + ?Sized> Sink for &mut S {

@@ -138,7 +138,8 @@ mod tests {
         exports
     }
     fn finish(exports: Exports) -> Result<Vec<PathBuf>, ExportError> {
-        exports.finish(&Histograms::new(&sample::layout()), &mut sample::run())
+        let mut summary = Summary { files: Vec::new(), ..sample::run() };
+        exports.finish(&Histograms::new(&sample::layout()), &mut summary)
     }
 
     #[test]
@@ -147,7 +148,9 @@ mod tests {
         let (a, b) = (dir.path().join("new/a"), dir.path().join("b"));
         let placed = finish(fed(&a)).unwrap();
         finish(fed(&b)).unwrap();
-        let named: BTreeSet<_> = EXPORTERS.iter().flat_map(|exporter| (exporter.files)(&sample::layout())).collect();
+        let layout = sample::layout();
+        let target = Target { dir: &a, layout: &layout, cycles: 3, rows: 100, tables: CsvTable::EVERY };
+        let named: BTreeSet<_> = EXPORTERS.iter().flat_map(|exporter| (exporter.files)(&target)).collect();
         assert_eq!(names(&a), named);
         assert_eq!(placed.len(), named.len());
         for name in named {
