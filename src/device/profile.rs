@@ -24,9 +24,9 @@ pub struct Profile {
     pub t_dp_min: Span,
     /// TDP_MAX, the longest T_DP (manual 3.3.2).
     pub t_dp_max: Span,
-    /// T_BASE_DP, the step of T_DP [1/12 us] (manual 3.3.1).
+    /// T_BASE_DP, the step of T_DP (1/12 us) (manual 3.3.1).
     pub t_base_dp: u32,
-    /// T_BASE_IO, the step of T_I and T_O [1/12 us] (manual 3.3.4).
+    /// T_BASE_IO, the step of T_I and T_O (1/12 us) (manual 3.3.4).
     pub t_base_io: u32,
     /// TI_MIN, the shortest T_I while octet 15 bit 1 is 0 (manual 3.3.5).
     pub t_i_min: Span,
@@ -36,7 +36,7 @@ pub struct Profile {
     pub gap_min: Span,
     /// Both minima, T_I and the gap, while octet 15 bit 1 is 1 (manual 3.2.2).
     pub functions_min: Span,
-    /// T_PLL_W_MAX, the widest window a tool may set [1/12 us].
+    /// T_PLL_W_MAX, the widest window a tool may set (1/12 us).
     pub t_pll_w_max: u16,
     /// The narrowest window; less is taken as this (manual 3.3.8).
     pub min_window: Span,
@@ -55,7 +55,7 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// MaxTsdr, the longest T_SDR at `rate` [t_bit].
+    /// MaxTsdr, the longest T_SDR at `rate` (t_bit).
     pub const fn max_tsdr(&self, rate: BitRate) -> Tbit {
         self.max_tsdr[rate as usize]
     }

@@ -41,7 +41,7 @@ pub struct Slot {
 /// A planned bus cycle.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Plan {
-    /// The Data_Exchange of every slave in address order (Model: D6).
+    /// The Data_Exchange of every configured slave in address order (Model: D6).
     pub slots: Vec<Slot>,
     /// T_DX: from t0 to the last bit of the last reply (Model: D2).
     pub t_dx: Span,
@@ -60,7 +60,7 @@ impl Plan {
         let t_id1 = bus.span(bus.t_id1());
         let mut start = bus.span(bus.t_id2());
         let mut slots = Vec::with_capacity(scenario.slaves.len());
-        for slave in &scenario.slaves {
+        for slave in scenario.configured() {
             let t_td = Bus::propagation(slave.position_mm.abs_diff(scenario.master.position_mm));
             let t_sdr = longest_tsdr(bus, slave, scenario.publishes(slave.address));
             let slot = slot(bus, slave, start, t_td * 2 + bus.span(t_sdr));
@@ -105,7 +105,7 @@ pub const fn smallest_t_o(t_dx: Span, t_o_min: Span, grid: Span) -> Span {
     Span::from_ticks((bound.div_euclid(grid.ticks()) + 1) * grid.ticks())
 }
 
-/// The longest T_SDR of `slave` [t_bit]: MaxTsdr, or min_TSDR in force where that is more. A publisher's min_TSDR is
+/// The longest T_SDR of `slave` (t_bit): MaxTsdr, or min_TSDR in force where that is more. A publisher's min_TSDR is
 /// T_ID1 (Model: D2, D27).
 pub fn longest_tsdr(bus: &BusParams, slave: &Slave, publishes: bool) -> Tbit {
     let min_tsdr = if publishes { bus.t_id1() } else { bus.min_tsdr };
@@ -196,6 +196,16 @@ mod tests {
             plan.slots.iter().map(|s| [s.request, s.request_end, s.reply, s.reply_end].map(tbit)).collect();
         assert_eq!(slots, [[800, 943, 1_743, 1_974], [2_050, 2_193, 3_005, 3_236]]);
         assert_eq!(tbit(plan.content()), 3_236 + (76 + 66 + 1_000) + (76 + 33) + (76 + 143));
+    }
+
+    #[test]
+    fn a_silent_station_takes_no_time() {
+        let mut network = network(BitRate::M12, find("posital-ocd-dpb1b").unwrap(), 3);
+        let all = Plan::of(&network);
+        network.slaves[1].silent = true;
+        let plan = Plan::of(&network);
+        assert_eq!(plan.slots.iter().map(|slot| slot.slave.get()).collect::<Vec<_>>(), [3, 5]);
+        assert_eq!(all.slots[..2].iter().map(|slot| slot.reply_end).max(), Some(plan.t_dx));
     }
 
     #[test]

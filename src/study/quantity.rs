@@ -164,7 +164,7 @@ pub fn tbit(text: &str) -> Result<Tbit, QuantityError> {
     u32::try_from(read(text, &BITS)?).map(Tbit).map_err(|_| range(text, &BITS, "0 tbit", "4294967295 tbit"))
 }
 
-/// Reads a length [mm], `"0.1 km"`.
+/// Reads a length (mm), `"0.1 km"`.
 ///
 /// # Errors
 /// No length, a fraction of a millimetre, or a length that is negative or beyond 1000 km.
@@ -177,7 +177,7 @@ pub fn millimetres(text: &str) -> Result<u64, QuantityError> {
     }
 }
 
-/// Reads a deviation of a frequency [10^-9], `"50 ppm"`.
+/// Reads a deviation of a frequency (10^-9), `"50 ppm"`.
 ///
 /// # Errors
 /// No deviation, a fraction of a ppb, or more than ±1000 ppm.
@@ -190,7 +190,7 @@ pub fn ppb(text: &str) -> Result<i64, QuantityError> {
     }
 }
 
-/// Reads a speed [10^-6 rpm], `"1500 rpm"`.
+/// Reads a speed (10^-6 rpm), `"1500 rpm"`.
 ///
 /// # Errors
 /// No speed, a fraction of 10^-6 rpm, or more than an `i64` holds.

@@ -55,7 +55,7 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// Longest scenario file [octets].
+    /// Longest scenario file (octets).
     pub const MAX_FILE: u64 = 4 << 20;
 
     /// Reads the file `path` with `overrides`, pairs of a dotted key and a value: `("master.t_o", "1.5 ms")`,
@@ -100,6 +100,10 @@ impl Scenario {
     pub fn slave(&self, address: Address) -> Option<&Slave> {
         self.slaves.binary_search_by_key(&address, |slave| slave.address).ok().map(|index| &self.slaves[index])
     }
+    /// The slaves that the master has in its list, in address order: all but the silent ones.
+    pub fn configured(&self) -> impl Iterator<Item = &Slave> {
+        self.slaves.iter().filter(|slave| !slave.silent)
+    }
     /// Whether the slave at `address` is parameterised as publisher.
     pub fn publishes(&self, address: Address) -> bool {
         self.links.iter().any(|link| link.publisher == address)
@@ -138,7 +142,7 @@ fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
 /// The text that `octets` are, without a byte order mark.
 fn decode(octets: &[u8]) -> Result<&str, Fault> {
     let text = std::str::from_utf8(octets).map_err(|error| {
-        let line = octets[..error.valid_up_to()].iter().filter(|&&octet| octet == b'\n').count() + 1;
+        let line = octets[..error.valid_up_to()].split(|&octet| octet == b'\n').count();
         let octet = octets[error.valid_up_to()];
         Fault::new(format!("this file is no UTF-8 text: octet {octet:02X} in line {line}"))
             .help("save it as UTF-8; a scenario is a text file")
@@ -163,6 +167,11 @@ pub struct Run {
     pub duration: Extent,
 }
 
+impl Run {
+    /// The longest run, 24 years of 365 days: the rest of the range of time is for what comes after the end.
+    pub const LONGEST: Span = Span::from_s(24 * 365 * 86_400);
+}
+
 /// A length of a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Extent {
@@ -177,12 +186,12 @@ pub enum Extent {
 pub struct Bus {
     /// Bit rate and the times of the data link layer.
     pub params: BusParams,
-    /// Length of the cable [mm], at most [`Bus::MAX_CABLE_MM`].
+    /// Length of the cable (mm), at most [`Bus::MAX_CABLE_MM`].
     pub cable_mm: u64,
 }
 
 impl Bus {
-    /// The longest cable [mm], 100 km. Model: no network of copper and glass comes near it.
+    /// The longest cable (mm), 100 km. Model: no network of copper and glass comes near it.
     pub const MAX_CABLE_MM: u64 = 100_000_000;
 
     /// T_TD, how long a signal takes for `mm` of cable: 5 ns/m (PROFIBUS network manual), rounded up to a tick.
@@ -196,13 +205,13 @@ impl Bus {
 pub struct Master {
     /// Its address, 0..=125.
     pub address: Address,
-    /// Where on the cable it sits [mm].
+    /// Where on the cable it sits (mm).
     pub position_mm: u64,
     /// How far its crystal is off.
     pub crystal: Crystal,
     /// Bus cycle T_DP (manual 3.3.2).
     pub t_dp: Span,
-    /// Master application cycle T_MAPC [T_DP], 1..=14 (manual 3.3.3).
+    /// Master application cycle T_MAPC (T_DP), 1..=14 (manual 3.3.3).
     pub t_mapc: u8,
     /// The watchdog that it sets in every slave; none is off.
     pub watchdog: Option<Watchdog>,
@@ -222,7 +231,7 @@ pub struct Master {
     pub life_start: u8,
 }
 
-/// How far a crystal is off its nominal frequency [10^-9], positive is fast.
+/// How far a crystal is off its nominal frequency (10^-9), positive is fast.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Crystal {
     /// This much.
@@ -269,7 +278,7 @@ pub struct Slave {
     pub address: Address,
     /// What it is.
     pub device: &'static Profile,
-    /// Where on the cable it sits [mm].
+    /// Where on the cable it sits (mm).
     pub position_mm: u64,
     /// How far its crystal is off.
     pub crystal: Crystal,
@@ -289,9 +298,9 @@ pub struct Slave {
     pub functions: bool,
     /// Octet 15 bit 3 with its values (manual 3.2.3, 3.2.4); needs `functions`.
     pub scaling: Option<Scaling>,
-    /// Configured as the others are, but it never answers.
+    /// Sits on the cable and never answers; the master does not have it in its list.
     pub silent: bool,
-    /// When its supply comes on [true time].
+    /// When its supply comes on (true time).
     pub powered_at: Span,
 }
 
@@ -320,9 +329,9 @@ pub enum CodeSequence {
 /// Scaling of the position.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Scaling {
-    /// Measuring units per revolution [counts], octets 16..=19 (manual 3.2.3).
+    /// Measuring units per revolution (counts), octets 16..=19 (manual 3.2.3).
     pub units_per_rev: u32,
-    /// Total measuring range [counts], octets 20..=23 (manual 3.2.4).
+    /// Total measuring range (counts), octets 20..=23 (manual 3.2.4).
     pub total_range: u32,
 }
 
@@ -333,9 +342,9 @@ pub struct Link {
     pub publisher: Address,
     /// Who takes them.
     pub subscriber: Address,
-    /// Where the sample begins in the publisher's inputs [octets].
+    /// Where the sample begins in the publisher's inputs (octets).
     pub offset: u8,
-    /// Length of the sample [octets].
+    /// Length of the sample (octets).
     pub length: u8,
 }
 
@@ -432,7 +441,6 @@ impl CsvTable {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::device::profile::PROFILES;
     use crate::sim::motion::Angle;
     use crate::time::BitRate;
 

@@ -5,9 +5,10 @@ use super::error::Fault;
 use super::kinds::jitter_bound;
 use super::section::Reader;
 use super::tree::Place;
-use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Scenario, Slave, When};
+use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Scenario, Slave, When};
 use crate::sim::noise::GcJitter;
 use crate::study::plan::Plan;
+use crate::study::quantity;
 use crate::time::{BitRate, Span};
 use crate::wire::Address;
 
@@ -24,15 +25,14 @@ struct Facts<'a> {
 const STAGES: &[&[Rule]] = &[
     &[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length],
     &[isochronous_rate, bus_parameters, device_max_tsdr, own_t_sdr],
-    &[t_dp_grid, t_dp_limits, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
+    &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
+    &[encoder_parameters],
     &[t_i_grid, t_o_grid, t_i_minimum, t_o_minimum, t_o_maximum, window, delay],
     &[functions, code_sequence, units_per_rev, total_range, jitter_fits, cycles_fit],
     &[publishers, subscribers, samples, link_counts, link_watchdog],
     &[event_stations, event_instants, disturbance_stations],
 ];
 
-/// The longest run: what is left of the range of time is for what happens after the end.
-const LONGEST_RUN: Span = Span::from_s(24 * 365 * 86_400);
 /// Largest offset of a crystal. Model: twice what cheap ones have over temperature and age.
 const CRYSTAL_MAX_PPB: i64 = 200_000;
 /// Most links of a subscriber (VPC3+C manual).
@@ -59,7 +59,7 @@ fn about(reader: &mut Reader<'_>, key: &str, others: &[&str], fault: Fault) {
         Place::Missing => reader.place(others),
         place => place,
     };
-    reader.complain(place, key, fault);
+    reader.complain_first(place, key, fault);
 }
 
 /// Complains about `key` of `slave`, which may have inherited it from `[master]`.
@@ -70,8 +70,9 @@ fn about_slave(reader: &mut Reader<'_>, slave: &Slave, key: &str, fault: Fault) 
 }
 
 fn some_slave(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    if facts.scenario.slaves.is_empty() {
-        let fault = Fault::new("there is no slave").help("add a [[slave]] with address, device, t_i and t_o");
+    if facts.scenario.configured().next().is_none() {
+        let fault =
+            Fault::new("there is no slave that answers").help("add a [[slave]] with address, device, t_i and t_o");
         about(reader, "slave", &[], fault);
     }
 }
@@ -128,9 +129,6 @@ fn crystals(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 fn run_length(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let (key, fault) = match facts.scenario.run.duration {
         Extent::Time(span) if span <= Span::ZERO => ("run.duration", Fault::new("a run of no time shows nothing")),
-        Extent::Time(span) if span > LONGEST_RUN => {
-            ("run.duration", Fault::new(format!("{span} is too long")).help("at most \"210240 h\", 24 years"))
-        }
         Extent::Cycles(0) => ("run.cycles", Fault::new("a run of no cycles shows nothing")),
         _ => return,
     };
@@ -164,7 +162,7 @@ fn bus_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn device_max_tsdr(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let params = &facts.scenario.bus.params;
-    let slowest = facts.scenario.slaves.iter().max_by_key(|slave| slave.device.max_tsdr(params.rate));
+    let slowest = facts.scenario.configured().max_by_key(|slave| slave.device.max_tsdr(params.rate));
     let Some(slave) = slowest else { return };
     let needed = slave.device.max_tsdr(params.rate);
     if needed > params.max_tsdr {
@@ -177,7 +175,7 @@ fn device_max_tsdr(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn own_t_sdr(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let params = &facts.scenario.bus.params;
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let min = params.min_tsdr;
         let max = slave.device.max_tsdr(params.rate).max(min);
         if !(min..=max).contains(&slave.t_sdr) {
@@ -189,27 +187,27 @@ fn own_t_sdr(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     }
 }
 
-fn t_dp_grid(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let t_dp = facts.scenario.master.t_dp;
-    for slave in &facts.scenario.slaves {
-        let grid = slave.device.dp_grid();
-        if !t_dp.is_multiple_of(grid) {
-            let fault = Fault::new(format!("T_DP = {t_dp} is not on the grid of {}", slave.device.name))
-                .rule(format!("T_DP is a multiple of T_BASE_DP = {grid} (manual 3.3.1, 3.3.2)"))
-                .help(neighbours("t_dp", t_dp, grid));
-            about(reader, "master.t_dp", &[], fault);
-        }
-    }
-}
-
 fn t_dp_limits(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let t_dp = facts.scenario.master.t_dp;
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let (min, max) = (slave.device.t_dp_min, slave.device.t_dp_max);
         if !(min..=max).contains(&t_dp) {
             let fault = Fault::new(format!("T_DP = {t_dp} is out of the range of {}", slave.device.name))
                 .rule(format!("T_DP is {min} to {max} (manual 3.3.2)"))
                 .help(format!("t_dp = \"{}\"", t_dp.clamp(min, max)));
+            about(reader, "master.t_dp", &[], fault);
+        }
+    }
+}
+
+fn t_dp_grid(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let t_dp = facts.scenario.master.t_dp;
+    for slave in facts.scenario.configured() {
+        let grid = slave.device.dp_grid();
+        if !t_dp.is_multiple_of(grid) {
+            let fault = Fault::new(format!("T_DP = {t_dp} is not on the grid of {}", slave.device.name))
+                .rule(format!("T_DP is a multiple of T_BASE_DP = {grid} (manual 3.3.1, 3.3.2)"))
+                .help(neighbours("t_dp", t_dp, grid));
             about(reader, "master.t_dp", &[], fault);
         }
     }
@@ -252,7 +250,7 @@ fn watchdog_outlasts_t_dp(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn t_i_grid(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let grid = slave.device.io_grid();
         if !slave.times.t_i.is_multiple_of(grid) {
             let fault = Fault::new(format!("T_I = {} is not on the grid", slave.times.t_i))
@@ -264,7 +262,7 @@ fn t_i_grid(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn t_o_grid(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let grid = slave.device.io_grid();
         if !slave.times.t_o.is_multiple_of(grid) {
             let fault = Fault::new(format!("T_O = {} is not on the grid", slave.times.t_o))
@@ -276,7 +274,7 @@ fn t_o_grid(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn t_i_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let min = slave.device.t_i_min(slave.functions);
         if slave.times.t_i < min {
             let section = if slave.functions { "3.2.2" } else { "3.3.5" };
@@ -293,7 +291,7 @@ fn t_i_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn t_o_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let t_dx = facts.plan.t_dx;
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let min = facts.plan.t_o_min(slave.device);
         if slave.times.t_o < min {
             let t_o_min = slave.device.t_o_min;
@@ -311,7 +309,7 @@ fn t_o_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 /// The gap rule; since T_I is above 0 it holds T_O below T_DP too.
 fn t_o_maximum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let t_dp = facts.scenario.master.t_dp;
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let (times, gap_min) = (&slave.times, slave.device.gap_min(slave.functions));
         let (min, max) = (facts.plan.t_o_min(slave.device), facts.plan.t_o_max(slave, t_dp));
         if times.t_o > max {
@@ -341,14 +339,14 @@ fn t_o_maximum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn window(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let max = Span::from_iso_units(u32::from(slave.device.t_pll_w_max));
         iso_units(reader, slave, ("t_pll_w", slave.times.t_pll_w), Span::from_iso_units(1), max, "3.3.8");
     }
 }
 
 fn delay(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let max = Span::from_iso_units(u32::from(u16::MAX));
         iso_units(reader, slave, ("t_pll_d", slave.times.t_pll_d), Span::ZERO, max, "3.3.9");
     }
@@ -362,19 +360,35 @@ fn iso_units(reader: &mut Reader<'_>, slave: &Slave, of: (&str, Span), min: Span
     if !(min..=max).contains(&span) {
         let fault = Fault::new(format!("{name} = {span} is out of range"))
             .rule(format!("{name} is {min} to {max} for {} (manual {section})", slave.device.name))
-            .help(format!("{key} = \"{} tick\" at {}", span.clamp(min, max).ticks(), span.clamp(min, max)));
+            .help(format!("{key} = {}", written(span.clamp(min, max))));
         about_slave(reader, slave, key, fault);
     } else if !span.is_multiple_of(unit) {
         let below = unit * span.div_floor(unit);
         let fault = Fault::new(format!("{name} = {span} is between two steps"))
             .rule(format!("{name} is a whole number of 1/12 us (manual {section})"))
-            .help(format!("the neighbours are \"{} tick\" and \"{} tick\"", below.ticks(), (below + unit).ticks()));
+            .help(format!("the neighbours are {key} = {} and {}", written(below), written(below + unit)));
         about_slave(reader, slave, key, fault);
     }
 }
 
+/// Octet 15 and scaling belong to the encoders' parameter block, which a subscriber does not have.
+fn encoder_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for slave in facts.scenario.configured().filter(|slave| slave.device.subscriber) {
+        let given = [
+            ("scaling", slave.scaling.is_some()),
+            ("functions", slave.functions),
+            ("code_sequence", slave.code_sequence == CodeSequence::Ccw),
+        ];
+        if let Some((key, _)) = given.into_iter().find(|&(_, given)| given) {
+            let fault = Fault::new(format!("{} has no {key}", slave.device.name))
+                .rule("scaling, preset and code sequence are parameters of encoders (manual 3.2)");
+            about_slave(reader, slave, key, fault);
+        }
+    }
+}
+
 fn functions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         if slave.scaling.is_some() && !slave.functions {
             let fault = Fault::new(format!("slave {} has scaling, but functions = false", slave.address))
                 .rule("scaling needs octet 15 bit 1 as well as bit 3 (manual 3.2.2, Model: D21)")
@@ -385,7 +399,7 @@ fn functions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn code_sequence(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         if slave.code_sequence == CodeSequence::Ccw && !slave.functions {
             let fault = Fault::new(format!("code_sequence = \"ccw\" has no effect in slave {}", slave.address))
                 .rule("the code sequence is in force with octet 15 bit 1 alone (manual 3.2.2)")
@@ -396,7 +410,7 @@ fn code_sequence(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn units_per_rev(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let (Some(scaling), steps) = (slave.scaling, slave.device.steps_per_rev) else { continue };
         if !(1..=steps).contains(&scaling.units_per_rev) {
             let fault = Fault::new(format!("{} units per revolution are out of range", scaling.units_per_rev))
@@ -408,7 +422,7 @@ fn units_per_rev(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn total_range(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let Some(scaling) = slave.scaling else { continue };
         let revolutions = slave.device.revolutions;
         let max = u64::from(scaling.units_per_rev) * u64::from(revolutions);
@@ -437,14 +451,14 @@ fn jitter_fits(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     if stray * times > spare {
         let fault = Fault::new(format!("jitter of {stray} ({words}) does not fit into the spare time of {spare}"))
             .rule(format!("{times} x {stray} <= T_DP {} - cycle {} (Model: D1, D6)", master.t_dp, facts.plan.content()))
-            .help(format!("at most {}, or a longer t_dp", Span::from_ticks(spare.ticks() / times)));
+            .help(format!("at most {}, or a longer t_dp", Span::from_us(spare.div_floor(Span::from_us(times)))));
         about(reader, "master.gc_jitter", &[], fault);
     }
 }
 
 fn cycles_fit(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let Extent::Cycles(cycles) = facts.scenario.run.duration else { return };
-    let most = LONGEST_RUN.div_floor(facts.scenario.master.t_dp) as u64;
+    let most = Run::LONGEST.div_floor(facts.scenario.master.t_dp) as u64;
     if cycles > most {
         let fault = Fault::new(format!("{cycles} cycles of {} are too long", facts.scenario.master.t_dp))
             .rule("a run ends within 24 years (Model: range of time)")
@@ -460,10 +474,10 @@ fn links<'a>(facts: &Facts<'a>) -> impl Iterator<Item = (String, &'a Link)> {
 
 fn publishers(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (path, link) in links(facts) {
-        let fault = match facts.scenario.slave(link.publisher) {
+        let fault = match configured(facts, link.publisher) {
             None => no_slave(facts, link.publisher),
             Some(slave) if !slave.device.publisher => Fault::new(format!("slave {} cannot publish", slave.address))
-                .rule(format!("{} has no publisher function ({})", slave.device.name, slave.device.source)),
+                .rule(format!("{} has no publisher function (its profile, manual 3.4)", slave.device.name)),
             Some(_) if link.publisher == link.subscriber => {
                 Fault::new(format!("slave {} would subscribe to itself", link.publisher))
                     .rule("publisher and subscriber are two slaves (manual 1.2)")
@@ -477,11 +491,11 @@ fn publishers(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 fn subscribers(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (i, (path, link)) in links(facts).enumerate() {
         let earlier = &facts.scenario.links[..i];
-        let fault = match facts.scenario.slave(link.subscriber) {
+        let fault = match configured(facts, link.subscriber) {
             None => no_slave(facts, link.subscriber),
             Some(_) if link.publisher == link.subscriber => continue,
             Some(slave) if !slave.device.subscriber => Fault::new(format!("slave {} cannot subscribe", slave.address))
-                .rule(format!("{} has no subscriber function ({})", slave.device.name, slave.device.source))
+                .rule(format!("{} has no subscriber function (its profile, manual 3.4)", slave.device.name))
                 .help("subscriber-drive can"),
             Some(_) if earlier.iter().any(|e| (e.publisher, e.subscriber) == (link.publisher, link.subscriber)) => {
                 Fault::new(format!("slave {} has this publisher already", link.subscriber))
@@ -494,10 +508,17 @@ fn subscribers(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     }
 }
 
-/// The fault of naming a slave that is not there.
+/// The slave at `address`, if the master has it in its list.
+fn configured<'a>(facts: &Facts<'a>, address: Address) -> Option<&'a Slave> {
+    facts.scenario.slave(address).filter(|slave| !slave.silent)
+}
+
+/// The fault of naming a slave that is not there, or silent.
 fn no_slave(facts: &Facts<'_>, address: Address) -> Fault {
-    let all: Vec<_> = facts.scenario.slaves.iter().map(|slave| slave.address.to_string()).collect();
-    Fault::new(format!("there is no slave {address}")).help(format!("the slaves are {}", all.join(", ")))
+    let all: Vec<_> = facts.scenario.configured().map(|slave| slave.address.to_string()).collect();
+    let silent = facts.scenario.slave(address).is_some();
+    let message = if silent { format!("slave {address} is silent") } else { format!("there is no slave {address}") };
+    Fault::new(message).help(format!("the slaves are {}", all.join(", ")))
 }
 
 fn samples(facts: &Facts<'_>, reader: &mut Reader<'_>) {
@@ -505,19 +526,21 @@ fn samples(facts: &Facts<'_>, reader: &mut Reader<'_>) {
         let Some(publisher) = facts.scenario.slave(link.publisher) else { continue };
         let (offset, length, inputs) = (u32::from(link.offset), u32::from(link.length), publisher.device.inputs);
         if length == 0 || offset + length > u32::from(inputs) {
-            let fault = Fault::new(format!("octets {offset} to {} are not in the publisher's data", offset + length))
-                .rule(format!(
-                    "length >= 1 and offset {offset} + length {length} <= {inputs} octets of {} (DXB link table)",
-                    publisher.device.name
-                ))
-                .help("offset = 4, length = 4 is G1_XIST1 of telegram 81");
+            let fault = Fault::new(format!(
+                "a sample of {length} octets from octet {offset} on is not in the publisher's data"
+            ))
+            .rule(format!(
+                "length >= 1 and offset {offset} + length {length} <= {inputs} octets of {} (DXB link table)",
+                publisher.device.name
+            ))
+            .help("offset = 4, length = 4 is G1_XIST1 of telegram 81");
             about(reader, &format!("{path}.length"), &[&format!("{path}.offset"), &format!("{path}.publisher")], fault);
         }
     }
 }
 
 fn link_counts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in &facts.scenario.slaves {
+    for slave in facts.scenario.configured() {
         let mut own = links(facts).filter(|(_, link)| link.subscriber == slave.address);
         if let Some((path, _)) = own.nth(LINKS_MAX) {
             let fault = Fault::new(format!("slave {} has more than {LINKS_MAX} links", slave.address))
@@ -591,7 +614,7 @@ fn shortest_t_dp(facts: &Facts<'_>) -> String {
         let times = facts.plan.t_o_min(slave.device) + gap + slave.times.t_i.max(slave.device.t_i_min(slave.functions));
         facts.plan.t_dp_min(slave.device).max(times.ceil_to(slave.device.dp_grid()))
     };
-    let shortest = facts.scenario.slaves.iter().map(needed).max().unwrap_or_default();
+    let shortest = facts.scenario.configured().map(needed).max().unwrap_or_default();
     format!("the shortest is t_dp = \"{shortest}\"")
 }
 
@@ -599,6 +622,16 @@ fn shortest_t_dp(facts: &Facts<'_>) -> String {
 fn neighbours(key: &str, span: Span, grid: Span) -> String {
     let below = grid * span.div_floor(grid);
     format!("the neighbours are {key} = \"{below}\" and \"{}\"", below + grid)
+}
+
+/// `span` as a scenario can have it, exactly.
+fn written(span: Span) -> String {
+    let shown = span.to_string();
+    if quantity::span(&shown, None) == Ok(span) {
+        format!("\"{shown}\"")
+    } else {
+        format!("\"{} tick\" ({shown})", span.ticks())
+    }
 }
 
 /// Whether octet 15 bit 1 is set, in words.

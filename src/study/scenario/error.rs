@@ -27,7 +27,7 @@ pub struct Problem {
 pub struct Position {
     /// Line, from 1.
     pub line: usize,
-    /// Column, from 1 [characters].
+    /// Column, from 1 (characters).
     pub column: usize,
     /// How many characters of the line are to blame, at least 1.
     pub width: usize,
@@ -81,7 +81,7 @@ impl fmt::Display for ScenarioError {
 }
 impl std::error::Error for ScenarioError {}
 
-/// Longest line that is shown [characters].
+/// Longest line that is shown (characters).
 const SHOWN: usize = 160;
 
 impl fmt::Display for Problem {

@@ -1,12 +1,12 @@
 //! Kinds: everything that a scenario names by a word, each with its keys. A new kind is a row and a function here.
 
 use super::error::Fault;
-use super::section::{Reader, Section, choice, number, positive, quantity};
+use super::section::{Reader, Section, choice, instant, number, quantity};
 use super::tree::{Node, Value};
 use super::{Action, Bursts, Disturbance, Service};
 use crate::sim::motion::{Angle, Motion, Shaft};
 use crate::sim::noise::{GcJitter, KINDS as JITTERS};
-use crate::study::quantity::{angle, micro_rpm, span};
+use crate::study::quantity::{angle, micro_rpm};
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -85,6 +85,7 @@ pub const DISTURBANCES: &[Kind<Disturbance>] = &[
 /// Services that a disturbance can be about.
 const SERVICES: &[(&str, Service)] = &[("data-exchange", Service::DataExchange), ("any", Service::Any)];
 
+#[expect(clippy::unnecessary_wraps, reason = "the signature of all kinds")]
 fn standstill(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Motion> {
     let at = section.optional(reader, "at", quantity("0.25 rev", angle)).unwrap_or_default();
     Some(Motion::Standstill { at })
@@ -96,7 +97,7 @@ fn speed(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Motion> {
 }
 fn sine(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Motion> {
     let amplitude = section.required(reader, "amplitude", "\"90 deg\"", quantity("90 deg", angle));
-    let period = section.required(reader, "period", "\"2 s\"", positive("2 s", |text| span(text, None)));
+    let period = section.required(reader, "period", "\"2 s\"", instant);
     let centre = section.optional(reader, "centre", quantity("0.25 rev", angle)).unwrap_or_default();
     let phase = section.optional(reader, "phase", quantity("90 deg", angle)).unwrap_or_default();
     Some(Motion::Sine { centre, amplitude: amplitude?, period: period?, phase })
@@ -113,10 +114,9 @@ fn table(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Motion> {
 /// One point of a table.
 fn point(node: &Node) -> Result<(Time, Angle), Fault> {
     match &node.value {
-        Value::List(pair) if pair.len() == 2 => Ok((
-            Time::ZERO + positive("1 s", |text| span(text, None))(&pair[0])?,
-            quantity("0.25 rev", angle)(&pair[1])?,
-        )),
+        Value::List(pair) if pair.len() == 2 => {
+            Ok((Time::ZERO + instant(&pair[0])?, quantity("0.25 rev", angle)(&pair[1])?))
+        }
         _ => Err(Fault::new("a point of a table is a time and an angle").help("[\"1 s\", \"0.25 rev\"]")),
     }
 }
@@ -134,10 +134,7 @@ pub(super) fn motion(mut section: Section<'_>, reader: &mut Reader<'_>) -> Optio
 pub(super) fn gc_jitter(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<(GcJitter, bool)> {
     let name = |node: &Node| choice(node, "jitter", JITTERS, |kind| kind.name);
     let kind = section.required(reader, "kind", "\"bounded-normal\"", name)?;
-    let mut values = kind
-        .parameters
-        .iter()
-        .map(|key| section.required(reader, key, "\"100 ns\"", positive("100 ns", |text| span(text, None))));
+    let mut values = kind.parameters.iter().map(|key| section.required(reader, key, "\"100 ns\"", instant));
     let (first, second) = (values.next().flatten(), values.next().flatten());
     let jitter = match kind.name {
         "none" => Some(GcJitter::None),
@@ -153,6 +150,7 @@ pub(super) fn gc_jitter(mut section: Section<'_>, reader: &mut Reader<'_>) -> Op
     Some((jitter?, accumulate))
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "the signature of all kinds")]
 fn hold_life_sign(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Action> {
     Some(Action::HoldLifeSign { cycles: section.optional(reader, "for", number(1..=u32::MAX)) })
 }

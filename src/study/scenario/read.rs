@@ -2,7 +2,7 @@
 
 use super::error::Fault;
 use super::kinds::{self, ACTIONS, DISTURBANCES, Kind, address};
-use super::section::{Reader, Section, choice, number, positive, quantity, suggestion, text, yes};
+use super::section::{Reader, Section, choice, cycle_time, instant, number, quantity, suggestion, text, yes};
 use super::tree::{Node, Place, Table, Value};
 use super::{
     Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Link, Master, Record, Run, Scaling,
@@ -12,7 +12,7 @@ use crate::device::profile::{PROFILES, Profile};
 use crate::fdl::params::BusParams;
 use crate::sim::motion::{Angle, Motion};
 use crate::sim::noise::GcJitter;
-use crate::study::quantity::{bit_rate, millimetres, ppb, span, tbit};
+use crate::study::quantity::{bit_rate, millimetres, ppb, tbit};
 use crate::time::{BitRate, Span, Tbit};
 use crate::wire::Address;
 
@@ -24,6 +24,8 @@ const SINGLE: usize = 4;
 /// A slave's table after its list of addresses has been written out: one per slave.
 struct SlaveTable {
     address: Address,
+    /// Of the key that says the address.
+    address_place: Place,
     place: Place,
     table: Table,
 }
@@ -113,20 +115,21 @@ fn list<T>(
 /// Writes out the addresses of every `[[slave]]`, in address order; of two slaves at one address the first comes first.
 fn slave_tables(reader: &mut Reader<'_>, root: &Table) -> Vec<SlaveTable> {
     let mut all = Vec::new();
-    for (i, (place, table)) in tables(reader, root, "slave").into_iter().enumerate() {
-        let mut section = Section::new(format!("slave, entry {}", i + 1), place, Some(table));
-        for (address, place) in addresses_of(reader, &mut section) {
-            reader.places.insert(format!("slave.{address}.address"), place);
+    for (place, table) in tables(reader, root, "slave") {
+        let mut section = Section::new("slave", place, Some(table));
+        for (address, address_place) in addresses_of(reader, &mut section) {
+            reader.places.insert(format!("slave.{address}.address"), address_place);
             let mut table = table.clone();
             table.0.retain(|key, _| key != "address" && key != "addresses");
-            all.push(SlaveTable { address, place: section.place(), table });
+            all.push(SlaveTable { address, address_place, place: section.place(), table });
         }
     }
     all.sort_by_key(|slave: &SlaveTable| slave.address);
     for pair in all.windows(2).filter(|pair| pair[0].address == pair[1].address) {
         let fault = Fault::new(format!("two slaves have the address {}", pair[0].address))
             .rule("every station of a bus has an address of its own (EN 50170-2)");
-        reader.complain(pair[0].place.max(pair[1].place), "slave", fault);
+        let place = pair[0].address_place.max(pair[1].address_place);
+        reader.complain(place, "slave.address", fault);
     }
     all.dedup_by_key(|slave| slave.address);
     all
@@ -190,8 +193,9 @@ fn overrides(reader: &mut Reader<'_>, root: &mut Table, slaves: &mut [SlaveTable
                 None => Err(Fault::new(format!("there is no [[{name}]] number \"{index}\"")).help("the first is 1")),
             },
             [name, _, ..] if TABLES[..SINGLE].contains(&name) => put(root, &path, &set.node),
-            [name, ..] => Err(Fault::new("an override names a table and a key")
-                .help(format!("for example master.t_dp=\"2 ms\"; {}", suggestion(name, TABLES.into_iter())))),
+            [name] if TABLES.contains(&name) => Err(Fault::new("an override names a table and a key")
+                .help("for example master.t_dp=2 ms, slave.3.crystal=20 ppm, link.1.length=2")),
+            [name, ..] => Err(Fault::new("there is no such table").help(suggestion(name, TABLES.into_iter()))),
             [] => Ok(()),
         };
         if let Err(fault) = result {
@@ -240,7 +244,7 @@ fn put(table: &mut Table, path: &[&str], node: &Node) -> Result<(), Fault> {
 /// Reads `[run]`.
 fn run(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Run> {
     let seed = section.optional(reader, "seed", number(0..=u64::MAX)).unwrap_or(1);
-    let time = section.optional(reader, "duration", positive("20 s", |text| span(text, None)));
+    let time = section.optional(reader, "duration", instant);
     let cycles = section.optional(reader, "cycles", number(0..=u64::MAX));
     if section.has("duration") == section.has("cycles") {
         let fault = Fault::new("a run has either duration or cycles");
@@ -282,7 +286,7 @@ fn bus(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Bus> {
     rate.map(|_| Bus { params, cable_mm })
 }
 
-/// A length of cable [mm].
+/// A length of cable (mm).
 fn cable(node: &Node) -> Result<u64, Fault> {
     match quantity("100 m", millimetres)(node)? {
         mm if mm > Bus::MAX_CABLE_MM => Err(Fault::new("no cable is longer than 100 km")),
@@ -294,13 +298,13 @@ fn cable(node: &Node) -> Result<u64, Fault> {
 fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> Option<(Master, Times)> {
     let s = &mut section;
     let address = s.required(reader, "address", "2", address);
-    let t_dp = s.required(reader, "t_dp", "\"2 ms\"", positive("2 ms", |text| span(text, Some(rate))));
+    let t_dp = s.required(reader, "t_dp", "\"2 ms\"", cycle_time(rate));
     let t_mapc = s.optional(reader, "t_mapc", number(0..=u8::MAX)).unwrap_or(1);
     let times = Times::read(reader, s, rate);
     let watchdog = s.optional(reader, "watchdog", watchdog).unwrap_or(Some(Watchdog { factor_1: 20, factor_2: 1 }));
     let get_cfg = s.optional(reader, "get_cfg", yes).unwrap_or(true);
     let dx_retries = s.optional(reader, "dx_retries", number(0..=15)).unwrap_or(1);
-    let lost_after = s.optional(reader, "lost_after", number(1..=u32::MAX)).unwrap_or(10);
+    let lost_after = s.optional(reader, "lost_after", number(1..=u32::from(u16::MAX))).unwrap_or(10);
     let clear_for = s.optional(reader, "clear_for", number(0..=i64::MAX as u64)).unwrap_or(0);
     let crystal = crystal(reader, s);
     let position_mm = s.optional(reader, "position", cable).unwrap_or(0);
@@ -329,6 +333,7 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
 }
 
 /// Isochronous times where they are given.
+#[expect(clippy::struct_field_names, reason = "the standard's names")]
 #[derive(Clone, Copy)]
 struct Times {
     t_i: Option<Span>,
@@ -340,7 +345,7 @@ struct Times {
 impl Times {
     /// Reads them.
     fn read(reader: &mut Reader<'_>, section: &mut Section<'_>, rate: BitRate) -> Self {
-        let mut time = |key| section.optional(reader, key, positive("125 us", |text| span(text, Some(rate))));
+        let mut time = |key| section.optional(reader, key, cycle_time(rate));
         Self { t_i: time("t_i"), t_o: time("t_o"), t_pll_w: time("t_pll_w"), t_pll_d: time("t_pll_d") }
     }
     /// Fills gaps from `other`.
@@ -357,7 +362,7 @@ impl Times {
 
 /// A watchdog; `"0 ms"` is none.
 fn watchdog(node: &Node) -> Result<Option<Watchdog>, Fault> {
-    let wanted = positive("200 ms", |text| span(text, None))(node)?;
+    let wanted = instant(node)?;
     if wanted == Span::ZERO {
         return Ok(None);
     }
@@ -422,7 +427,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     // Scaling turns octet 15 bit 1 on unless the file says otherwise, which a rule then refuses.
     let functions = s.optional(reader, "functions", yes).unwrap_or(scaling.is_some());
     let silent = s.optional(reader, "silent", yes).unwrap_or(false);
-    let powered_at = s.optional(reader, "powered_at", positive("1 s", |text| span(text, None))).unwrap_or(Span::ZERO);
+    let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
     section.finish(reader);
     let times = iso_times(reader, from, own.or(context.times), context.times.is_some());
     let (device, bus) = (device?, context.bus?);
@@ -445,16 +450,16 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     })
 }
 
-/// The times in force; T_I and T_O must come from the slave or from a `[master]` that could be read.
+/// The times in force; T_I and T_O must come from the slave or from `[master]`, if that could be read (`master`).
 fn iso_times(reader: &mut Reader<'_>, from: &SlaveTable, times: Times, master: bool) -> Option<IsoTimes> {
     for (key, time, example) in [("t_i", times.t_i, "125 us"), ("t_o", times.t_o, "1 ms")] {
-        let path = format!("slave.{}.{key}", from.address);
-        let given = [path.as_str(), &format!("master.{key}")].iter().any(|key| reader.places.contains_key(*key));
+        let keys = [format!("master.{key}"), format!("slave.{}.{key}", from.address)];
+        let given = keys.iter().any(|key| reader.places.contains_key(key));
         if time.is_none() && !given && master {
-            let fault = Fault::new("this key is missing, here and under [master]")
-                .help(format!("for example under [master]: {key} = \"{example}\""))
-                .rule(format!("every slave has its {} (manual 3.3)", key.to_uppercase()));
-            reader.complain(from.place, &path, fault);
+            let fault = Fault::new(format!("this key is missing, and slave {} has no own {key}", from.address))
+                .rule(format!("every slave has its {} (manual 3.3)", key.to_uppercase()))
+                .help(format!("for example: {key} = \"{example}\""));
+            reader.complain(reader.place(&["master"]), &keys[0], fault);
         }
     }
     Some(IsoTimes {
@@ -501,7 +506,7 @@ fn link(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Link> {
 /// Reads one `[[event]]`; `all` are the addresses of all slaves.
 fn event(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> Option<Event> {
     let s = &mut section;
-    let at = s.optional(reader, "at", positive("1 s", |text| span(text, None)));
+    let at = s.optional(reader, "at", instant);
     let cycle = s.optional(reader, "cycle", number(0..=i64::MAX as u64));
     if s.has("at") == s.has("cycle") {
         let fault = Fault::new("an event has either at or cycle");

@@ -1,9 +1,10 @@
 //! One table of a scenario file, read key by key: what is asked for is known, everything else is an unknown key.
 
+use super::Run;
 use super::error::{Fault, Problem};
 use super::tree::{Node, Place, Source, Table, Value};
-use crate::study::quantity::QuantityError;
-use crate::time::Span;
+use crate::study::quantity::{QuantityError, span};
+use crate::time::{BitRate, Span};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -23,9 +24,17 @@ impl<'a> Reader<'a> {
     }
     /// Notes that `key` at `place` is wrong. The same fault of the same value, shared by several slaves, is noted once.
     pub(super) fn complain(&mut self, place: Place, key: &str, fault: Fault) {
-        let same = |(at, _, other): &(Place, String, Fault)| *at == place && other.rule == fault.rule;
-        if place == Place::Missing || fault.rule.is_empty() || !self.problems.iter().any(same) {
+        let same = |(at, _, other): &(Place, String, Fault)| {
+            *at == place && (*other == fault || (!fault.rule.is_empty() && other.rule == fault.rule))
+        };
+        if place == Place::Missing || !self.problems.iter().any(same) {
             self.problems.push((place, key.to_owned(), fault));
+        }
+    }
+    /// As [`Self::complain`] unless something else is wrong there already.
+    pub(super) fn complain_first(&mut self, place: Place, key: &str, fault: Fault) {
+        if place == Place::Missing || self.problems.iter().all(|&(at, ..)| at != place) {
+            self.complain(place, key, fault);
         }
     }
     /// The place of the first of `keys` that was given.
@@ -58,7 +67,10 @@ impl<'t> Section<'t> {
     /// The table `name` of the file.
     pub(super) fn of_file(reader: &mut Reader<'_>, root: &'t Table, name: &'static str) -> Self {
         match root.0.get(name) {
-            Some((place, Node { value: Value::Table(table), .. })) => Self::new(name, *place, Some(table)),
+            Some((place, Node { value: Value::Table(table), .. })) => {
+                reader.places.insert(name.to_owned(), *place);
+                Self::new(name, *place, Some(table))
+            }
             Some((place, node)) => {
                 let fault = Fault::new(format!("this is {}", node.value.noun())).help(format!("write [{name}]"));
                 reader.complain(*place, name, fault);
@@ -131,23 +143,29 @@ impl<'t> Section<'t> {
     pub(super) fn finish(self, reader: &mut Reader<'_>) {
         for (key, (place, _)) in self.table.iter().flat_map(|table| &table.0) {
             if !self.asked.contains(&key.as_str()) {
-                let fault = Fault::new("there is no such key").help(suggestion(key, self.asked.iter().copied()));
+                let open: Vec<_> = self.asked.iter().copied().filter(|asked| !self.has(asked)).collect();
+                // A key that is not there yet is more likely meant than one that is.
+                let help =
+                    nearest(key, open.into_iter()).unwrap_or_else(|| suggestion(key, self.asked.iter().copied()));
+                let fault = Fault::new("there is no such key").help(help);
                 reader.complain(*place, &self.path_of(key), fault);
             }
         }
     }
 }
 
+/// "did you mean ..." if one of `known` is near `word`.
+fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<String> {
+    // Nothing long is near, and the distance of long words takes long.
+    let word: String = word.chars().take(60).collect::<String>().to_lowercase().replace('_', "-");
+    let distance = |name: &str| strsim::damerau_levenshtein(&word, &name.replace('_', "-"));
+    let (distance, name) = known.map(|name| (distance(name), name)).min_by_key(|&(distance, _)| distance)?;
+    (distance <= (word.chars().count() / 3).max(1)).then(|| format!("did you mean \"{name}\"?"))
+}
+
 /// "did you mean ..." if one of `known` is near `word`, otherwise all of them.
 pub(super) fn suggestion<'k>(word: &str, known: impl Iterator<Item = &'k str> + Clone) -> String {
-    let word = word.to_lowercase().replace('_', "-");
-    let distance = |name: &str| strsim::damerau_levenshtein(&word, &name.replace('_', "-"));
-    let nearest = known.clone().map(|name| (distance(name), name)).min_by_key(|&(distance, _)| distance);
-    match nearest {
-        Some((distance, name)) if distance <= (word.chars().count() / 3).max(1) => format!("did you mean \"{name}\"?"),
-        Some(_) => format!("known here: {}", known.collect::<Vec<_>>().join(", ")),
-        None => "nothing is known here".to_owned(),
-    }
+    nearest(word, known.clone()).unwrap_or_else(|| format!("known here: {}", known.collect::<Vec<_>>().join(", ")))
 }
 
 /// The row of `rows` whose name `node` is; `name` tells a row's name, `noun` what the rows are.
@@ -222,14 +240,24 @@ pub(super) fn quantity<T>(
     }
 }
 
-/// As [`quantity`] for times that are not negative.
-pub(super) fn positive(
-    example: &'static str,
-    read: impl Fn(&str) -> Result<Span, QuantityError>,
-) -> impl Fn(&Node) -> Result<Span, Fault> {
-    let read = quantity(example, read);
-    move |node| match read(node)? {
+/// A time in a run: not negative, and not after the end of the longest run.
+pub(super) fn instant(node: &Node) -> Result<Span, Fault> {
+    match quantity("2 s", |text| span(text, None))(node)? {
         span if span < Span::ZERO => Err(Fault::new(format!("{span} is negative"))),
+        span if span > Run::LONGEST => Err(Fault::new(format!("\"{}\" is after the end of every run", text(node)?))
+            .rule("a run ends within 24 years of 365 days (Model: range of time)")
+            .help("at most \"210240 h\"")),
+        span => Ok(span),
+    }
+}
+
+/// A time in a bus cycle, with bit times at `rate`: not negative, and short enough to reckon with.
+pub(super) fn cycle_time(rate: BitRate) -> impl Fn(&Node) -> Result<Span, Fault> {
+    move |node| match quantity("125 us", |text| span(text, Some(rate)))(node)? {
+        span if span < Span::ZERO => Err(Fault::new(format!("{span} is negative"))),
+        span if span > Span::from_s(1) => {
+            Err(Fault::new(format!("{span} is longer than any bus cycle")).rule("T_DP is at most 32 ms (Model: D3)"))
+        }
         span => Ok(span),
     }
 }
