@@ -85,13 +85,13 @@ fn run_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
     let scenario = Scenario::load(&args.scenario, &sets)?;
     let bar = Bar::new(&scenario);
     let Outcome { summary, dir, .. } = run::<NearQueue<NetworkEvent>>(&scenario, Some(&args.out), |at| bar.show(at))?;
-    bar.bar.finish_and_clear();
+    bar.line.finish_and_clear();
     Ok(report::render(&summary, dir.as_ref().map(|dir| dir.display().to_string()).as_deref()))
 }
 
 /// The progress bar; nothing where standard error is no terminal.
 struct Bar {
-    bar: ProgressBar,
+    line: ProgressBar,
     end: Option<Span>,
     cycles: Option<u64>,
     started: Instant,
@@ -112,7 +112,7 @@ impl Bar {
         bar.set_style(style.expect("a template that is right").progress_chars("=> "));
         bar.set_prefix(scenario.name.clone());
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self { bar, end, cycles, started: Instant::now() }
+        Self { line: bar, end, cycles, started: Instant::now() }
     }
 
     fn show(&self, at: Progress) {
@@ -121,9 +121,9 @@ impl Bar {
             (_, Some(cycles)) => at.cycles as f64 / cycles.max(1) as f64,
             _ => 1.0,
         };
-        self.bar.set_position((share * Self::LENGTH as f64) as u64);
+        self.line.set_position((share * Self::LENGTH as f64) as u64);
         let speed = at.simulated.as_s() / self.started.elapsed().as_secs_f64().max(1e-9);
-        self.bar.set_message(format!(
+        self.line.set_message(format!(
             "{:.1} s simulated, cycle {}, {speed:.0} x real time",
             at.simulated.as_s(),
             at.cycles

@@ -21,8 +21,7 @@ fn the_same_seed_gives_the_same_run_and_another_does_not() {
 #[test]
 fn the_queue_does_not_matter() {
     let reference = scenario("reference", &[SHORT]);
-    let [near, heap] =
-        [Run::on::<NearQueue<NetworkEvent>>(&reference), Run::on::<HeapQueue<NetworkEvent>>(&reference)];
+    let [near, heap] = [Run::on::<NearQueue<NetworkEvent>>(&reference), Run::on::<HeapQueue<NetworkEvent>>(&reference)];
     assert_eq!(near.fingerprint, heap.fingerprint);
     assert_eq!(near.telegrams, heap.telegrams);
 }
@@ -31,8 +30,8 @@ fn the_queue_does_not_matter() {
 fn files_and_plots_change_nothing() {
     let dir = tempfile::tempdir().expect("a directory");
     let reference = scenario("reference", &[SHORT]);
-    let [with, without] = [Some(dir.path()), None]
-        .map(|out| run::<NearQueue<NetworkEvent>>(&reference, out, |_| ()).expect("a run"));
+    let [with, without] =
+        [Some(dir.path()), None].map(|out| run::<NearQueue<NetworkEvent>>(&reference, out, |_| ()).expect("a run"));
     assert_eq!(with.fingerprint, without.fingerprint);
     assert_eq!(with.statistics, without.statistics);
 }

@@ -161,7 +161,7 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         dx_retries: master.dx_retries,
         lost_after: master.lost_after.min(u16::MAX.into()) as u16,
         clear_for: master.clear_for,
-        data_control_time: master.watchdog.map_or(DATA_CONTROL_TIME, |watchdog| watchdog.span()),
+        data_control_time: master.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
     let addresses = slaves.iter().map(|slave| slave.address);
