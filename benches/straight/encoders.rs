@@ -16,7 +16,8 @@ const MASTER: u8 = 2;
 /// Cycles after which every network has long started up.
 const ENOUGH: u64 = 20_000;
 
-/// A network of so many encoders, 1 to 122, with these times.
+/// A network of so many encoders, 1 to 122, with these times. The watchdog is longer than the start-up of all of them,
+/// in which each is asked only once in so many cycles.
 fn timed(encoders: u8, t_dp: Span, t_o: Span) -> Scenario {
     let (first, last) = (MASTER + 1, MASTER + encoders);
     let text = format!(
@@ -32,6 +33,7 @@ fn timed(encoders: u8, t_dp: Span, t_o: Span) -> Scenario {
         t_i = "125 us"
         t_o = "{t_o}"
         t_pll_w = "1 us"
+        watchdog = "10 s"
         gc_jitter = {{ kind = "bounded-normal", sigma = "100 ns", bound = "400 ns" }}
         crystal = {{ within = "50 ppm" }}
         [[slave]]
@@ -62,13 +64,17 @@ pub(crate) struct Station {
     fcb: Option<Fcb>,
     /// First cycle with a Data_Exchange.
     pub(crate) joined: u64,
-    /// Cycle of the first SYNCH that its clock recovery took.
-    pub(crate) clock: u64,
+    /// Cycle of the first SYNCH that its clock recovery took, in its first attempt.
+    clock: Option<u64>,
 }
 impl Station {
     /// Its crystal.
     pub(crate) fn crystal(&self) -> &Crystal {
         self.crystal.as_ref().expect("a station that was seen")
+    }
+    /// Cycle of the first SYNCH that its clock recovery took.
+    pub(crate) fn clock(&self) -> u64 {
+        self.clock.expect("a slave whose clock recovery has started")
     }
     /// FCB of its first Data_Exchange.
     pub(crate) fn fcb(&self) -> Fcb {
@@ -109,7 +115,9 @@ impl Recorder for StartUp {
                 self.cycle = cycle;
                 self.first.get_or_insert(nominal);
             }
-            Observation::Clock { verdict: ClockVerdict::First, .. } => station.clock = self.cycle,
+            Observation::Clock { verdict: ClockVerdict::First, .. } => {
+                station.clock.get_or_insert(self.cycle);
+            }
             Observation::Handler { slave, to: HandlerState::DataExchange, .. } => {
                 self.stations[usize::from(slave.get())].joined = self.cycle + 1;
             }

@@ -209,7 +209,7 @@ impl Slave {
                 monitor: Monitor::new(MonitorSettings::new(1, TOLERANCE)),
                 joined: told.joined,
             },
-            clock: told.clock,
+            clock: told.clock(),
             latch_offset: empty("latch_offset"),
             pll_error: empty("pll_error"),
         }
