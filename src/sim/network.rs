@@ -60,9 +60,6 @@ pub enum Until {
     Cycle(u64),
 }
 
-/// Deadlines of a station: the timers, and the asked sample behind them.
-const DEADLINES: usize = Timer::ALL.len() + 1;
-
 /// A deadline. Only one event of it counts at a time; arming it later than that event costs nothing until it comes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Deadline {
@@ -86,7 +83,7 @@ struct Slot<S> {
     filter: Filter,
     powered: bool,
     sample_with_telegrams: bool,
-    deadlines: [Deadline; DEADLINES],
+    deadlines: [Deadline; Outbox::DEADLINES],
     /// Number of the station's next event.
     number: u64,
 }
@@ -137,7 +134,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 filter,
                 powered: false,
                 sample_with_telegrams: false,
-                deadlines: [Deadline::default(); DEADLINES],
+                deadlines: [Deadline::default(); Outbox::DEADLINES],
                 number: 0,
             });
         }
@@ -322,9 +319,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             station.filter = filter;
             self.sort_listeners();
         }
-        for (which, order) in self.out.orders().iter().copied().chain([self.out.sample_order()]).enumerate() {
+        for (which, order) in self.out.orders() {
             match order {
-                Order::Keep => {}
                 Order::Off => self.slots[slot].deadlines[which].due = None,
                 Order::At(at) => Self::arm(&mut self.queue, &mut self.slots[slot], which, at.max(now), self.now),
             }
