@@ -363,7 +363,7 @@ pub enum Observation {
     Used {
         /// Whose.
         publisher: Address,
-        /// The value [steps].
+        /// The value (steps).
         position: u32,
     },
     /// The state of a link changed.

@@ -29,7 +29,7 @@ pub trait Function {
     fn max_failures(prm: &SetPrm<'_>) -> u8;
     /// Whether these parameters switch on what takes the longer computing time (manual 3.2.2).
     fn slow(prm: &SetPrm<'_>) -> bool;
-    /// G1_XIST1 and the right-justified position for G1_XIST2 at this raw position [steps].
+    /// G1_XIST1 and the right-justified position for G1_XIST2 at this raw position (steps).
     fn position(&self, raw: u32) -> (u32, u32);
     /// Sets the position (manual 2.2, G1_STW bits 11 and 12) at this raw position.
     fn preset(&mut self, preset: Preset, raw: u32);

@@ -261,7 +261,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             self.bus.heard(id);
         }
     }
-    /// The shaft's raw position now [steps]; zero without a shaft.
+    /// The shaft's raw position now (steps); zero without a shaft.
     fn raw(&self, slot: usize) -> u32 {
         self.slots[slot].site.shaft.as_ref().map_or(0, |(shaft, resolution)| resolution.raw(shaft.angle(self.now)))
     }

@@ -135,7 +135,7 @@ mod tests {
 
     const GRID: Span = Span::from_us(125);
 
-    /// T_DX [us] of n encoders by rate, longest T_SDR as in the profile and as in a fast ASIC's GSD.
+    /// T_DX (us) of n encoders by rate, longest T_SDR as in the profile and as in a fast ASIC's GSD.
     #[test]
     fn worked_values_of_t_dx() {
         let table = [

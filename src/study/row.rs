@@ -21,7 +21,7 @@ pub struct CycleRow {
     pub t_dx: Option<Span>,
     /// Largest minus smallest latch offset over the locked slaves (Model: D9); none with fewer than two.
     pub latch_skew: Option<Span>,
-    /// The same in counts: largest minus smallest latch offset x speed of the slave's shaft [steps].
+    /// The same in counts: largest minus smallest latch offset x speed of the slave's shaft (steps).
     pub skew_counts: Option<f64>,
     /// Repeated requests.
     pub retries: u32,
