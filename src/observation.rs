@@ -8,6 +8,8 @@ use core::fmt;
 
 use crate::time::{Local, Span};
 use crate::wire::Address;
+use crate::wire::acyclic::ErrorCode;
+use crate::wire::parameter::{self, ErrorNumber};
 
 macro_rules! named {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* }) => {
@@ -184,6 +186,32 @@ named! {
     }
 }
 
+/// Why an acyclic request failed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum AcyclicFailure {
+    /// The slave's service access point is closed.
+    Closed,
+    /// Nothing came in time.
+    Timeout,
+    /// The slave left data exchange.
+    Left,
+    /// The slave refused it, with this class and code (DP-V1).
+    Refused(ErrorCode),
+    /// The answer cannot be read.
+    Unreadable,
+}
+impl fmt::Display for AcyclicFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Closed => f.write_str("its service access point is closed"),
+            Self::Timeout => f.write_str("no answer in time"),
+            Self::Left => f.write_str("it left data exchange"),
+            Self::Refused(code) => write!(f, "refused: {code}"),
+            Self::Unreadable => f.write_str("its answer cannot be read"),
+        }
+    }
+}
+
 /// Something a station saw or did. Instants are readings of the station's own crystal.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Observation {
@@ -278,6 +306,49 @@ pub enum Observation {
         slave: Address,
         /// Held or running.
         held: bool,
+    },
+
+    /// The master application asks a slave for parameters, or to change one.
+    ParameterRequest {
+        /// Whom.
+        slave: Address,
+        /// Parameter number.
+        pnu: u16,
+        /// First element.
+        subindex: u16,
+        /// Elements, 0 for a parameter that is no array.
+        elements: u8,
+        /// Change instead of read.
+        change: bool,
+    },
+    /// One value of a slave's answer.
+    ParameterValue {
+        /// Whose.
+        slave: Address,
+        /// Parameter number.
+        pnu: u16,
+        /// Element.
+        subindex: u16,
+        /// The value.
+        value: u32,
+    },
+    /// A parameter that a slave did not give or change.
+    ParameterError {
+        /// Whose.
+        slave: Address,
+        /// Parameter number.
+        pnu: u16,
+        /// Element asked for first.
+        subindex: u16,
+        /// Error number (PROFIdrive).
+        number: u16,
+    },
+    /// An acyclic request got no answer that could be used.
+    AcyclicFailed {
+        /// From whom.
+        slave: Address,
+        /// Why.
+        why: AcyclicFailure,
     },
 
     // ----- slave
@@ -452,6 +523,19 @@ impl fmt::Display for Observation {
             Self::MasterLifeHeld { slave, held } => {
                 write!(f, "master sign of life for {slave} {}", if *held { "held" } else { "running" })
             }
+            Self::ParameterRequest { slave, pnu, subindex, elements, change } => {
+                let verb = if *change { "change" } else { "read" };
+                write!(f, "slave {slave}: {verb} P{pnu}[{subindex}], {elements} elements, {}", parameter::name(*pnu))
+            }
+            Self::ParameterValue { slave, pnu, subindex, value } => {
+                let element = parameter::element(*pnu, *subindex);
+                write!(f, "slave {slave}: P{pnu}[{subindex}] = {value} ({value:X} hex), {element}")
+            }
+            Self::ParameterError { slave, pnu, subindex, number } => {
+                let name = ErrorNumber::from_code(*number).map_or("error not assigned", ErrorNumber::name);
+                write!(f, "slave {slave}: P{pnu}[{subindex}] error {number:02X}, {name}")
+            }
+            Self::AcyclicFailed { slave, why } => write!(f, "slave {slave}: acyclic request failed, {why}"),
             Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
             Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
             Self::Clock { verdict, error, window, counter, .. } => {

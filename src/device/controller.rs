@@ -5,12 +5,15 @@
 
 use alloc::vec::Vec;
 
+use crate::device::parameter_client::ParameterClient;
 use crate::device::sign_of_life::{LifeSign, Monitor, MonitorSettings};
 use crate::dp::master::Application;
+use crate::dp::ms1::{Failure, Job};
 use crate::fdl::Outbox;
 use crate::observation::{LifeState, MasterMode, Observation};
 use crate::wire::Address;
 use crate::wire::drive::{G1Stw, Inputs81, Outputs81, Stw2};
+use crate::wire::parameter::{Format, ParameterAddress};
 
 /// Tolerated failures of a slave's sign of life (Model: D17).
 const TOLERANCE: u16 = 4;
@@ -30,6 +33,10 @@ pub enum Command {
     ReleaseLife(Address),
     /// Go on counting from this value.
     JumpLife(Address, u8),
+    /// Ask for a parameter over the parameter channel (manual 4).
+    ReadParameter(Address, ParameterAddress),
+    /// Ask to change a parameter to this value of this format.
+    ChangeParameter(Address, ParameterAddress, Format, u32),
 }
 
 impl Command {
@@ -40,7 +47,9 @@ impl Command {
             | Self::ControlWord(slave, _)
             | Self::HoldLife(slave, _)
             | Self::ReleaseLife(slave)
-            | Self::JumpLife(slave, _) => slave,
+            | Self::JumpLife(slave, _)
+            | Self::ReadParameter(slave, _)
+            | Self::ChangeParameter(slave, ..) => slave,
         }
     }
 }
@@ -74,6 +83,7 @@ pub struct Controller {
     axes: Vec<Axis>,
     t_mapc: u8,
     start: LifeSign,
+    parameters: ParameterClient,
 }
 
 impl Controller {
@@ -90,7 +100,12 @@ impl Controller {
             monitor: Monitor::new(MonitorSettings::new(1, TOLERANCE)),
             received: LifeSign::INVALID,
         };
-        Self { axes: slaves.into_iter().map(axis).collect(), t_mapc, start: LifeSign::new(start) }
+        Self {
+            axes: slaves.into_iter().map(axis).collect(),
+            t_mapc,
+            start: LifeSign::new(start),
+            parameters: ParameterClient::default(),
+        }
     }
     /// State of the check of a slave's sign of life.
     pub fn slave_life(&self, slave: Address) -> Option<LifeState> {
@@ -171,13 +186,26 @@ impl Application for Controller {
         }
     }
     fn command(&mut self, command: Command, out: &mut Outbox) {
-        let Some(axis) = self.axes.iter_mut().find(|axis| axis.slave == command.slave()) else { return };
+        let mut all = self.axes.iter_mut().enumerate();
+        let Some((slave, axis)) = all.find(|(_, axis)| axis.slave == command.slave()) else { return };
         match command {
             Command::Acknowledge(_) => axis.acknowledge = ACKNOWLEDGE_CYCLES + 1,
             Command::ControlWord(_, bits) => axis.control = bits,
             Command::HoldLife(_, cycles) => axis.hold(cycles.map_or(Held::ForGood, Held::For), out),
             Command::ReleaseLife(_) => axis.hold(Held::No, out),
             Command::JumpLife(_, to) => (axis.sign, axis.age) = (LifeSign::new(to), 0),
+            Command::ReadParameter(_, parameter) => {
+                self.parameters.ask((slave, axis.slave), parameter, None, out);
+            }
+            Command::ChangeParameter(_, parameter, format, value) => {
+                self.parameters.ask((slave, axis.slave), parameter, Some((format, value)), out);
+            }
         }
+    }
+    fn acyclic(&mut self) -> Option<Job> {
+        self.parameters.job()
+    }
+    fn acyclic_done(&mut self, _slave: usize, answer: Result<&[u8], Failure>, out: &mut Outbox) {
+        self.parameters.answered(answer, out);
     }
 }

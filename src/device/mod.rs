@@ -5,6 +5,7 @@ pub mod drive;
 pub mod encoder;
 pub mod isochronous;
 pub mod node;
+pub mod parameter_client;
 pub mod pll;
 pub mod position;
 pub mod profile;

@@ -8,11 +8,13 @@
 use crate::device::isochronous::{IsoSettings, Isochronous};
 use crate::device::profile::Profile;
 use crate::device::sensor::{Answer, Fault, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
+use crate::dp::ms1::Records;
 use crate::dp::slave::{Application, Identity, Refusal, Slave};
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
 use crate::observation::{self, Observation, Phase, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::Address;
+use crate::wire::acyclic::{ErrorCode, Record};
 use crate::wire::drive::{G1Zsw, Inputs81, Outputs81, Zsw2};
 use crate::wire::prm::{Block, BlockType, IsoM, SetPrm};
 
@@ -33,6 +35,13 @@ pub trait Function {
     fn position(&self, raw: u32) -> (u32, u32);
     /// Sets the position (manual 2.2, G1_STW bits 11 and 12) at this raw position.
     fn preset(&mut self, preset: Preset, raw: u32);
+    /// Answers a request of the parameter channel (manual 4). Returns the length of the answer (octets).
+    ///
+    /// # Errors
+    /// Class and code of the negative answer.
+    fn parameters(&self, _address: Address, _request: &[u8], _out: &mut [u8]) -> Result<usize, ErrorCode> {
+        Err(ErrorCode::NOT_SUPPORTED)
+    }
     /// T_O came.
     fn set_point(&mut self, _now: Local, _out: &mut Outbox) {}
     /// A publisher's reply was heard.
@@ -56,6 +65,15 @@ pub struct UnitSettings {
     pub t_sdr: Tbit,
     /// Tolerated clock failures (Model: D15).
     pub clock_tolerance: u8,
+    /// How the sensor handshake answers where vendors differ.
+    pub sensor: SensorOptions,
+}
+
+impl UnitSettings {
+    /// Settings with the defaults of the model.
+    pub fn new(address: Address, rate: BitRate, t_sdr: Tbit) -> Self {
+        Self { address, rate, t_sdr, clock_tolerance: 1, sensor: SensorOptions::default() }
+    }
 }
 
 /// A complete isochronous slave.
@@ -69,9 +87,10 @@ pub struct Unit<F> {
 #[derive(Clone, Debug)]
 struct Body<F> {
     profile: &'static Profile,
-    clock_tolerance: u8,
+    settings: UnitSettings,
     iso: Option<Isochronous>,
     sensor: Sensor,
+    channel: Channel,
     function: F,
     outputs: Outputs81,
     /// Raw position of the last latch, for a preset.
@@ -100,9 +119,10 @@ impl<F: Function> Unit<F> {
         };
         let body = Body {
             profile,
-            clock_tolerance: settings.clock_tolerance,
+            settings,
             iso: None,
-            sensor: Sensor::new(SensorOptions::default()),
+            sensor: Sensor::new(settings.sensor),
+            channel: Channel::EMPTY,
             function,
             outputs: Outputs81::default(),
             raw: 0,
@@ -131,7 +151,8 @@ impl<F: Function> Body<F> {
         if let Some(mut iso) = self.iso.take() {
             iso.leave(out);
         }
-        self.sensor = Sensor::new(SensorOptions::default());
+        self.sensor = Sensor::new(self.settings.sensor);
+        self.channel = Channel::EMPTY;
         self.causes = Faults::NONE;
         self.answer = Answer::NONE;
         self.outputs = Outputs81::default();
@@ -232,6 +253,45 @@ impl<F: Function> Body<F> {
     }
 }
 
+/// The parameter channel: the answer to the request written last.
+#[derive(Clone, Debug)]
+struct Channel {
+    octets: [u8; Self::MAX],
+    len: Option<usize>,
+}
+
+impl Channel {
+    /// Octets of the longest answer (C1_Max_Data_Len of the encoders).
+    const MAX: usize = 240;
+    const EMPTY: Self = Self { octets: [0; Self::MAX], len: None };
+    /// The slot of the telegram's module (manual 6.3).
+    const SLOT: u8 = 1;
+
+    fn check(record: Record) -> Result<(), ErrorCode> {
+        match (record.slot, record.index) {
+            (Self::SLOT, Record::PARAMETER_CHANNEL) => Ok(()),
+            (Self::SLOT, _) => Err(ErrorCode::INDEX),
+            _ => Err(ErrorCode::SLOT),
+        }
+    }
+}
+
+impl<F: Function> Records for Body<F> {
+    fn read(&mut self, record: Record, out: &mut [u8]) -> Result<usize, ErrorCode> {
+        Channel::check(record)?;
+        let len = self.channel.len.ok_or(ErrorCode::STATE_CONFLICT)?;
+        out.get_mut(..len).ok_or(ErrorCode::READ_CONSTRAINT)?.copy_from_slice(&self.channel.octets[..len]);
+        Ok(len)
+    }
+    fn write(&mut self, record: Record, data: &[u8]) -> Result<(), ErrorCode> {
+        Channel::check(record)?;
+        self.channel.len = None;
+        let len = self.function.parameters(self.settings.address, data, &mut self.channel.octets)?;
+        self.channel.len = Some(len);
+        Ok(())
+    }
+}
+
 /// The isochronous block, where there is one.
 fn iso_block<'a>(prm: &SetPrm<'a>) -> Result<Option<Block<'a>>, Refusal> {
     let mut found = None;
@@ -262,7 +322,7 @@ impl<F: Function> Application for Body<F> {
         let iso = iso_block(prm).ok().flatten().filter(|_| prm.dpv1.isom_req());
         self.iso = iso
             .and_then(|block| IsoM::parse(&block).ok())
-            .map(|iso| Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), self.clock_tolerance)));
+            .map(|iso| Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), self.settings.clock_tolerance)));
         self.function.parameterise(prm, watchdog);
     }
     fn enter(&mut self, _now: Local, out: &mut Outbox) {
