@@ -185,6 +185,23 @@ named! {
         InRing = "master, in ring",
     }
 }
+named! {
+    /// What the two LEDs in the connection cap show, red/green (manual 5.2).
+    Leds {
+        /// No supply.
+        NoSupply = "dark/dark",
+        /// Ready, but nothing configured it since power on.
+        NotConfigured = "bright/bright",
+        /// Parameters or configuration were refused.
+        Refused = "bright/flashing",
+        /// Ready, but its master does not exchange data with it.
+        NotAddressed = "flashing/bright",
+        /// Nothing came for a longer time.
+        Silence = "bright/dark",
+        /// Data exchange.
+        DataExchange = "dark/bright",
+    }
+}
 
 /// Why an acyclic request failed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -423,6 +440,18 @@ pub enum Observation {
         /// Code in `G1_XIST2` until now.
         code: u16,
     },
+    /// The LEDs show something else (manual 5.2).
+    Leds {
+        /// Before.
+        from: Leds,
+        /// Now.
+        to: Leds,
+    },
+    /// The supply was switched.
+    Power {
+        /// On or off.
+        on: bool,
+    },
 
     // ----- slave to slave
     /// A publisher's reply was taken over by a subscriber.
@@ -552,6 +581,8 @@ impl fmt::Display for Observation {
             Self::MasterLife { from, to } => write!(f, "master sign of life {from} -> {to}"),
             Self::Fault { code } => write!(f, "fault {code:04X}"),
             Self::Acknowledged { code } => write!(f, "fault {code:04X} acknowledged"),
+            Self::Leds { from, to } => write!(f, "LEDs red/green {from} -> {to}"),
+            Self::Power { on } => write!(f, "supply {}", if *on { "on" } else { "off" }),
             Self::Subscribed { publisher } => write!(f, "data of publisher {publisher}"),
             Self::Used { publisher, position } => write!(f, "position {position} of publisher {publisher} used"),
             Self::Link { publisher, from, to } => write!(f, "link to {publisher}: {from} -> {to}"),
