@@ -40,48 +40,25 @@ const AXIS: u8 = 1;
 /// The most revolutions that P979 tells: a device with 65 536 reports this.
 const REVOLUTIONS_MAX: u32 = 0xFFFF;
 
-/// A parameter of the device.
+/// A parameter of the device. Its name and those of its elements: [`name`](crate::wire::parameter::name),
+/// [`element`](crate::wire::parameter::element).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Parameter {
     /// Parameter number, PNU.
     pub pnu: u16,
-    /// What it is, in the manual's words.
-    pub name: &'static str,
     /// Format of its value or of each element.
     pub format: Format,
-    /// What the elements are, from subindex 0; none for a parameter that is no array.
-    pub elements: &'static [&'static str],
+    /// Elements, from subindex 0; 0 for a parameter that is no array.
+    pub elements: u16,
 }
 
 /// Every parameter, by number (manual 4; elements PROFIdrive).
 pub const PARAMETERS: &[Parameter] = &[
-    Parameter { pnu: 918, name: "Profibus address", format: Format::Unsigned16, elements: &[] },
-    Parameter { pnu: 922, name: "telegram type", format: Format::Unsigned16, elements: &[] },
-    Parameter {
-        pnu: 964,
-        name: "device identification",
-        format: Format::Unsigned16,
-        elements: &["manufacturer", "device type", "firmware version", "year", "day and month", "axes"],
-    },
-    Parameter { pnu: 965, name: "profile number", format: Format::OctetString, elements: &[] },
-    Parameter {
-        pnu: 979,
-        name: "sensor format",
-        format: Format::Unsigned32,
-        elements: &[
-            "header",
-            "type",
-            "steps per revolution",
-            "shift of G1_XIST1",
-            "shift of G1_XIST2",
-            "determinable revolutions",
-            "reserved",
-            "reserved",
-            "reserved",
-            "reserved",
-            "reserved",
-        ],
-    },
+    Parameter { pnu: 918, format: Format::Unsigned16, elements: 0 },
+    Parameter { pnu: 922, format: Format::Unsigned16, elements: 0 },
+    Parameter { pnu: 964, format: Format::Unsigned16, elements: 6 },
+    Parameter { pnu: 965, format: Format::OctetString, elements: 0 },
+    Parameter { pnu: 979, format: Format::Unsigned32, elements: 11 },
 ];
 
 /// The device itself, the elements of P964.
@@ -276,8 +253,8 @@ fn value(id: RequestId, axis: u8, address: ParameterAddress, octets: &Octets) ->
     let all = octets.get(parameter.pnu);
     let (elements, first) = (usize::from(address.elements), usize::from(address.subindex));
     let data = match (parameter.elements, elements, first) {
-        ([], 0 | 1, 0) => all,
-        ([], ..) => return Err(ErrorNumber::NoArray),
+        (0, 0 | 1, 0) => all,
+        (0, ..) => return Err(ErrorNumber::NoArray),
         (_, 0, _) => return Err(ErrorNumber::BadAddress),
         (_, elements, first) => {
             let size = parameter.format.size();

@@ -6,12 +6,13 @@
 //! the next request will find (Model: D8, D10).
 
 use crate::device::isochronous::{IsoSettings, Isochronous};
+use crate::device::leds::{LedInput, LedLogic};
 use crate::device::profile::Profile;
 use crate::device::sensor::{Answer, Fault, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
 use crate::dp::ms1::Records;
 use crate::dp::slave::{Application, Identity, Refusal, Slave};
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
-use crate::observation::{self, Observation, Phase, SlaveState};
+use crate::observation::{self, Leds, Observation, Phase, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::Address;
 use crate::wire::acyclic::{ErrorCode, Record};
@@ -81,6 +82,7 @@ impl UnitSettings {
 pub struct Unit<F> {
     slave: Slave,
     body: Body<F>,
+    leds: LedLogic,
 }
 
 /// The unit behind its DP slave.
@@ -130,7 +132,7 @@ impl<F: Function> Unit<F> {
             answer: Answer::NONE,
             inputs: Inputs81::default(),
         };
-        Self { slave: Slave::new(identity), body }
+        Self { slave: Slave::new(identity), body, leds: LedLogic::default() }
     }
     /// The DP slave.
     pub const fn slave(&self) -> &Slave {
@@ -139,6 +141,20 @@ impl<F: Function> Unit<F> {
     /// Start-up phase now.
     pub fn phase(&self) -> Phase {
         self.body.iso.as_ref().map_or(Phase::Configuration, Isochronous::phase)
+    }
+    /// What the LEDs show.
+    pub const fn leds(&self) -> Leds {
+        self.leds.leds()
+    }
+    fn update_leds(&mut self, now: Local, heard: bool, out: &mut Outbox) {
+        let input = LedInput { powered: true, state: self.slave.state(), fault: self.slave.has_fault(), heard };
+        let before = self.leds.next_deadline();
+        if let Some((from, to)) = self.leds.update(now, input) {
+            out.observe(Observation::Leds { from, to });
+        }
+        if let Some(deadline) = self.leds.next_deadline().filter(|&deadline| before != Some(deadline)) {
+            out.arm(Timer::Leds, deadline);
+        }
     }
     /// What the next request will find.
     pub const fn inputs(&self) -> &Inputs81 {
@@ -375,8 +391,10 @@ impl<F: Function> Station for Unit<F> {
         self.slave.filter(&self.body)
     }
     fn step(&mut self, now: Local, input: Input<'_, Self::Command>, out: &mut Outbox) {
+        let heard = matches!(input, Input::Telegram(_));
         match input {
             Input::PowerOn => {
+                self.leds = LedLogic::default();
                 self.body.reset(out);
                 self.body.function.leave(out);
                 self.slave.power_on(now, &mut self.body, out);
@@ -389,5 +407,6 @@ impl<F: Function> Station for Unit<F> {
             Input::Deadline { .. } | Input::Sent | Input::Sample(_) => {}
             Input::Command(never) => match never {},
         }
+        self.update_leds(now, heard, out);
     }
 }

@@ -172,6 +172,10 @@ impl Slave {
     pub const fn state(&self) -> SlaveState {
         self.state
     }
+    /// Whether the last parameters or configuration were refused.
+    pub fn has_fault(&self) -> bool {
+        self.fault != DiagStatus::default()
+    }
     /// Which telegrams it wants.
     pub fn filter(&self, app: &impl Application) -> Filter {
         Filter { all: false, own: self.identity.address, publishers: app.publishers() }
