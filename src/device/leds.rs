@@ -160,3 +160,187 @@ const fn shown(input: LedInput, silent: bool, configured: bool) -> Leds {
         (_, _, _, true) => Leds::NotAddressed,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observation::Observation;
+    use alloc::format;
+    use alloc::string::ToString;
+    use alloc::vec::Vec;
+    use proptest::prelude::*;
+
+    const OFF: LedInput = LedInput { powered: false, state: SlaveState::PowerOn, fault: false, heard: false };
+
+    fn at(s: i64) -> Local {
+        Local::ZERO + Span::from_s(s)
+    }
+    fn input(state: SlaveState) -> LedInput {
+        LedInput { powered: true, state, fault: false, heard: true }
+    }
+    /// The logic after these inputs, one a second from second 0.
+    fn after(inputs: &[LedInput]) -> LedLogic {
+        let mut logic = LedLogic::default();
+        for (s, &input) in (0..).zip(inputs) {
+            logic.update(at(s), input);
+        }
+        logic
+    }
+
+    #[test]
+    fn the_six_patterns_are_those_of_the_manual() {
+        let table: Vec<_> = Leds::ALL.iter().map(|leds| (leds.number(), leds.red(), leds.green())).collect();
+        assert_eq!(
+            table,
+            [
+                (1, Lamp::Dark, Lamp::Dark),
+                (2, Lamp::Bright, Lamp::Bright),
+                (3, Lamp::Bright, Lamp::Flashing),
+                (4, Lamp::Flashing, Lamp::Bright),
+                (5, Lamp::Bright, Lamp::Dark),
+                (6, Lamp::Dark, Lamp::Bright),
+            ]
+        );
+        for leds in Leds::ALL {
+            assert_eq!(leds.text(), format!("{}/{}", leds.red().text(), leds.green().text()));
+            assert!(!leds.meaning().is_empty());
+        }
+    }
+
+    #[test]
+    fn a_change_is_an_event_that_reads_as_the_manual() {
+        let change = Observation::Leds { from: Leds::NotAddressed, to: Leds::DataExchange };
+        assert_eq!(change.to_string(), "LEDs red/green flashing/bright -> dark/bright");
+        let power = Observation::Power { on: false };
+        assert_eq!(power.to_string(), "supply off");
+        assert!(change.is_event() && power.is_event());
+    }
+
+    #[test]
+    fn a_flashing_lamp_is_lit_in_the_first_half_of_each_second() {
+        for (ms, lit) in [(0, true), (499, true), (500, false), (999, false), (1_000, true), (-1, false), (-501, true)]
+        {
+            let now = Local::ZERO + Span::from_ms(ms);
+            assert_eq!(Lamp::Flashing.is_lit(now), lit, "{ms}");
+            assert!(Lamp::Bright.is_lit(now) && !Lamp::Dark.is_lit(now));
+        }
+    }
+
+    #[test]
+    fn every_state_with_every_input_shows_its_pattern() {
+        use SlaveState::{DataExch, PowerOn, WaitCfg, WaitPrm};
+        let walked = [
+            // Before, state, fault, silent: pattern.
+            (&[][..], PowerOn, false, false, Leds::NotConfigured),
+            (&[], WaitPrm, false, false, Leds::NotConfigured),
+            (&[], WaitPrm, true, false, Leds::Refused),
+            (&[], WaitPrm, false, true, Leds::Silence),
+            (&[], WaitPrm, true, true, Leds::Refused),
+            (&[], WaitCfg, false, false, Leds::NotAddressed),
+            (&[], WaitCfg, false, true, Leds::Silence),
+            (&[WaitCfg], WaitPrm, false, false, Leds::NotAddressed),
+            (&[WaitCfg], WaitPrm, true, false, Leds::Refused),
+            (&[WaitCfg], WaitPrm, false, true, Leds::Silence),
+            (&[WaitCfg], DataExch, false, false, Leds::DataExchange),
+            (&[WaitCfg, DataExch], DataExch, false, true, Leds::DataExchange),
+            (&[WaitCfg, DataExch], WaitPrm, false, false, Leds::NotAddressed),
+            (&[WaitCfg, DataExch], WaitPrm, true, false, Leds::Refused),
+            (&[WaitCfg, DataExch], WaitPrm, false, true, Leds::Silence),
+        ];
+        for (before, state, fault, silent, expected) in walked {
+            let states = [&[WaitPrm], before].concat();
+            let mut logic = after(&states.iter().map(|&state| input(state)).collect::<Vec<_>>());
+            let now = at(if silent { states.len() as i64 + 39 } else { 10 });
+            logic.update(now, LedInput { fault, heard: false, ..input(state) });
+            assert_eq!(logic.leds(), expected, "{before:?} {state} fault {fault} silent {silent}");
+            assert_eq!(logic.update(now, OFF), Some((expected, Leds::NoSupply)));
+            assert_eq!(logic, LedLogic::default());
+        }
+    }
+
+    #[test]
+    fn a_refused_attempt_counts_as_configuration() {
+        let refused = LedInput { fault: true, ..input(SlaveState::WaitPrm) };
+        assert_eq!(after(&[refused]).leds(), Leds::Refused);
+        assert_eq!(after(&[refused, input(SlaveState::WaitPrm)]).leds(), Leds::NotAddressed);
+        assert_eq!(after(&[refused, OFF, input(SlaveState::WaitPrm)]).leds(), Leds::NotConfigured);
+    }
+
+    #[test]
+    fn only_changes_are_told() {
+        let mut logic = LedLogic::default();
+        let told = [OFF, input(SlaveState::WaitPrm), input(SlaveState::WaitPrm), input(SlaveState::WaitCfg)]
+            .map(|input| logic.update(at(1), input));
+        assert_eq!(
+            told,
+            [None, Some((Leds::NoSupply, Leds::NotConfigured)), None, Some((Leds::NotConfigured, Leds::NotAddressed))]
+        );
+    }
+
+    #[test]
+    fn who_never_heard_anything_is_not_configured_rather_than_cut_off() {
+        let mut logic = LedLogic::default();
+        let deaf = LedInput { heard: false, ..input(SlaveState::WaitPrm) };
+        logic.update(at(0), deaf);
+        assert_eq!(logic.next_deadline(), None);
+        assert_eq!((logic.update(at(1_000), deaf), logic.leds()), (None, Leds::NotConfigured));
+    }
+
+    #[test]
+    fn silence_begins_40_s_after_the_last_telegram() {
+        let deaf = LedInput { heard: false, ..input(SlaveState::WaitPrm) };
+        let mut logic = after(&[input(SlaveState::WaitPrm)]);
+        assert_eq!(logic.next_deadline(), Some(at(40)));
+        logic.update(at(15), input(SlaveState::WaitPrm));
+        assert_eq!(logic.next_deadline(), Some(at(40)), "stays while telegrams come");
+        assert_eq!(logic.update(at(40), deaf), None, "a telegram came since");
+        assert_eq!(logic.next_deadline(), Some(at(55)));
+        assert_eq!(logic.update(at(55) - Span::from_ticks(1), deaf), None);
+        assert_eq!(logic.update(at(55), deaf), Some((Leds::NotConfigured, Leds::Silence)));
+        assert_eq!(logic.next_deadline(), None);
+        let back = logic.update(at(70), input(SlaveState::WaitPrm));
+        assert_eq!((back, logic.next_deadline()), (Some((Leds::Silence, Leds::NotConfigured)), Some(at(110))));
+    }
+
+    #[test]
+    fn data_exchange_needs_no_deadline_and_leaving_it_brings_one() {
+        let mut logic = after(&[input(SlaveState::WaitCfg), input(SlaveState::DataExch)]);
+        logic.update(at(40), input(SlaveState::DataExch));
+        assert_eq!(logic.next_deadline(), None);
+        logic.update(at(50), input(SlaveState::DataExch));
+        let deaf = LedInput { heard: false, ..input(SlaveState::WaitPrm) };
+        assert_eq!(logic.update(at(60), deaf), Some((Leds::DataExchange, Leds::NotAddressed)));
+        assert_eq!(logic.next_deadline(), Some(at(90)));
+    }
+
+    fn any_input() -> impl Strategy<Value = (i64, LedInput)> {
+        let state = prop::sample::select(SlaveState::ALL);
+        (0i64..60, prop::bool::weighted(0.95), state, prop::bool::weighted(0.1), any::<bool>())
+            .prop_map(|(wait, powered, state, fault, heard)| (wait, LedInput { powered, state, fault, heard }))
+    }
+
+    proptest! {
+        /// Who updates at its changes and at the deadlines alone sees what an update in every second sees.
+        #[test]
+        fn the_deadline_is_never_too_late(inputs in prop::collection::vec(any_input(), 1..60)) {
+            let (mut lazy, mut eager) = (LedLogic::default(), LedLogic::default());
+            let (mut s, mut last) = (0, OFF);
+            for (wait, input) in inputs {
+                for _ in 0..wait {
+                    let quiet = LedInput { heard: false, ..last };
+                    if lazy.next_deadline().is_some_and(|deadline| deadline <= at(s)) {
+                        lazy.update(at(s), quiet);
+                    }
+                    eager.update(at(s), quiet);
+                    prop_assert_eq!(lazy.leds(), eager.leds(), "{} s", s);
+                    s += 1;
+                }
+                lazy.update(at(s), input);
+                eager.update(at(s), input);
+                prop_assert_eq!(lazy.leds(), eager.leds(), "{} s", s);
+                prop_assert!(lazy.next_deadline().is_none_or(|deadline| deadline > at(s)));
+                last = input;
+            }
+        }
+    }
+}

@@ -263,3 +263,279 @@ fn value(id: RequestId, axis: u8, address: ParameterAddress, octets: &Octets) ->
     };
     Ok(Values { format: parameter.format, data })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::position::{CodeSequence, Scaling};
+    use crate::wire::parameter::{Response, emit_request};
+    use alloc::string::ToString;
+    use alloc::vec::Vec;
+    use proptest::prelude::*;
+
+    /// 29-bit encoder at address 55 with the identification of the vectors.
+    fn parameters() -> Parameters {
+        let identification = DeviceIdentification {
+            manufacturer: 0x012A,
+            device_type: 0,
+            firmware: 0x1000,
+            year: 2007,
+            day_month: 0x1109,
+            axes: 1,
+        };
+        Parameters {
+            address: Address::new(55).unwrap(),
+            telegram: 81,
+            identification,
+            profile: Parameters::PROFILE,
+            format: format(8192, 65_536, None),
+        }
+    }
+    fn format(steps: u32, revolutions: u32, scaling: Option<(u32, u32)>) -> SensorFormat {
+        let scaling = scaling.map(|(units_per_rev, total_range)| Scaling { units_per_rev, total_range });
+        SensorFormat::of(&Position::new(steps, revolutions, CodeSequence::Cw, scaling).unwrap())
+    }
+    fn hex(text: &str) -> Vec<u8> {
+        text.split(' ').map(|octet| u8::from_str_radix(octet, 16).unwrap()).collect()
+    }
+    fn answered(parameters: &Parameters, request: &[u8]) -> Result<Vec<u8>, Refused> {
+        let mut out = [0xEE; 300];
+        let len = parameters.answer(request, &mut out)?;
+        assert!(out[len..].iter().all(|&octet| octet == 0xEE));
+        Ok(out[..len].to_vec())
+    }
+    fn check(parameters: &Parameters, request: &str, response: &str) {
+        assert_eq!(answered(parameters, &hex(request)), Ok(hex(response)), "{request}");
+    }
+    fn read(addresses: &[ParameterAddress]) -> Vec<u8> {
+        let mut out = [0; 300];
+        let len = emit_request((7, RequestId::Read, 0), addresses, &[], &mut out).unwrap();
+        out[..len].to_vec()
+    }
+    /// Every element of `parameter`.
+    fn whole(parameter: &Parameter) -> ParameterAddress {
+        let elements = parameter.elements.len() as u8;
+        ParameterAddress { attribute: ParameterAddress::VALUE, elements, pnu: parameter.pnu, subindex: 0 }
+    }
+
+    #[test]
+    fn answers_are_those_of_real_devices() {
+        let device = parameters();
+        check(&device, "AA 01 00 01 10 01 03 96 00 00", "AA 01 00 01 06 01 00 37");
+        let p964 = "01 01 00 01 06 05 01 2A 00 00 10 00 07 D7 11 09";
+        check(&device, "01 01 00 01 10 05 03 C4 00 00", p964);
+        check(&device, "01 01 00 01 10 01 03 C5 00 00", "01 01 00 01 0A 02 03 02");
+        let p979 = "AA 01 00 01 07 06 00 00 51 11 80 00 00 02 00 00 20 00 00 00 00 03 00 00 00 00 00 00 FF FF";
+        check(&device, "AA 01 00 01 10 06 03 D3 00 00", p979);
+        let disc_13_12 = Parameters { format: format(8192, 4096, None), ..device };
+        let p979 = "01 01 00 01 07 05 80 00 00 02 00 00 20 00 00 00 00 07 00 00 00 00 00 00 10 00";
+        check(&disc_13_12, "01 01 00 01 10 05 03 D3 00 01", p979);
+        check(&device, "01 01 00 01 10 01 03 9A 00 00", "01 01 00 01 06 01 00 51");
+        check(&device, "01 01 00 01 10 01 03 9D 00 00", "01 81 00 01 44 01 00 00");
+    }
+
+    #[test]
+    fn each_error_has_its_reason() {
+        for (axis, id, address, number) in [
+            (0, "01", "10 01 00 01 00 00", 0x00),
+            (0, "01", "30 01 00 01 00 00", 0x00),
+            (0, "01", "10 01 03 C4 00 06", 0x03),
+            (0, "01", "10 02 03 C4 00 05", 0x03),
+            (0, "01", "10 07 03 C4 00 00", 0x03),
+            (0, "01", "10 0C 03 D3 00 00", 0x03),
+            (0, "01", "10 FF 03 D3 FF FF", 0x03),
+            (0, "01", "10 01 03 96 00 01", 0x04),
+            (0, "01", "10 02 03 96 00 00", 0x04),
+            (0, "01", "10 02 03 C5 00 00", 0x04),
+            (0, "01", "20 01 03 96 00 00", 0x09),
+            (0, "01", "30 01 03 96 00 00", 0x0F),
+            (0, "01", "10 00 03 C4 00 00", 0x16),
+            (0, "01", "00 01 03 96 00 00", 0x16),
+            (0, "01", "11 01 03 96 00 00", 0x16),
+            (2, "01", "10 01 03 96 00 00", 0x19),
+            (255, "02", "10 01 00 01 00 00", 0x19),
+            (0, "02", "10 01 03 9D 00 00", 0x00),
+            (0, "02", "10 01 03 96 00 00", 0x01),
+            (0, "02", "10 01 03 96 00 09", 0x01),
+            (0, "02", "20 01 03 96 00 00", 0x07),
+            (0, "02", "30 01 03 96 00 00", 0x0F),
+            (0, "02", "40 01 03 96 00 00", 0x16),
+        ] {
+            let mut request = hex(&alloc::format!("05 {id} {axis:02X} 01 {address}"));
+            if id == "02" {
+                request.extend(hex("06 01 00 38"));
+            }
+            let id = if id == "01" { 0x81 } else { 0x82 };
+            let expected = [5, id, axis, 1, 0x44, 1, 0, number].to_vec();
+            assert_eq!(answered(&parameters(), &request), Ok(expected), "{id} axis {axis} {address}");
+        }
+    }
+
+    #[test]
+    fn axis_0_and_axis_1_are_the_same() {
+        let device = parameters();
+        check(&device, "AA 01 01 01 10 00 03 96 00 00", "AA 01 01 01 06 01 00 37");
+    }
+
+    #[test]
+    fn several_parameters_fail_or_succeed_each_for_itself() {
+        let device = parameters();
+        let request = "09 01 00 03 10 01 03 96 00 00 10 01 00 02 00 00 10 02 03 D3 00 02";
+        check(&device, request, "09 81 00 03 06 01 00 37 44 01 00 00 07 02 00 00 20 00 00 00 00 03");
+        let change = "09 02 00 02 10 01 03 96 00 00 10 01 00 02 00 00 06 01 00 05 05 01 07 00";
+        check(&device, change, "09 82 00 02 44 01 00 01 44 01 00 00");
+    }
+
+    #[test]
+    fn the_table_is_what_is_answered() {
+        let device = parameters();
+        assert!(PARAMETERS.is_sorted_by_key(|parameter| parameter.pnu));
+        for parameter in PARAMETERS {
+            let response = answered(&device, &read(&[whole(parameter)])).unwrap();
+            let response = Response::parse(&response).unwrap();
+            let values: Vec<_> = response.values().collect();
+            assert_eq!((response.id, values.len(), values[0].format), (ResponseId::Read, 1, parameter.format));
+            match parameter.elements.len() {
+                0 => assert_eq!(values[0].data.len(), 2, "P{}", parameter.pnu),
+                elements => assert_eq!(values[0].count(), elements, "P{}", parameter.pnu),
+            }
+            for subindex in 0..parameter.elements.len() {
+                let address = ParameterAddress { elements: 1, subindex: subindex as u16, ..whole(parameter) };
+                let response = answered(&device, &read(&[address])).unwrap();
+                let element = Response::parse(&response).unwrap().values().next().and_then(|one| one.unsigned(0));
+                assert_eq!(element, values[0].unsigned(subindex), "P{}[{subindex}]", parameter.pnu);
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_too_long_and_shorter_values_behind_it_are_read() {
+        let device = parameters();
+        let address = whole(&PARAMETERS[0]);
+        let format = whole(&PARAMETERS[4]);
+        // Five formats of 46 octets, an address of 4 and the header are 238. A sixth format is too long; so is the fifth,
+        // because a refusal is kept free for each parameter.
+        let request = read(&[format, format, format, format, format, address]);
+        assert_eq!(answered(&device, &request).map(|response| response.len()), Ok(238));
+        let request = read(&[format, format, format, format, format, format, address]);
+        let response = answered(&device, &request).unwrap();
+        let response = Response::parse(&response).unwrap();
+        let numbers: Vec<_> = response.values().map(|values| values.error_number()).collect();
+        assert_eq!(response.id, ResponseId::ReadFailed);
+        assert_eq!(numbers, [None, None, None, None, Some(0x15), Some(0x15), None]);
+        assert_eq!(answered(&device, &read(&[address; MAX_COUNT])).map(|response| response.len()), Ok(160));
+    }
+
+    #[test]
+    fn an_out_that_is_short_makes_values_too_long_and_then_the_request_unavailable() {
+        let (device, request) = (parameters(), read(&[whole(&PARAMETERS[2])]));
+        let mut out = [0; MAX_LEN];
+        for (room, len) in [(18, Ok(18)), (17, Ok(8)), (8, Ok(8)), (7, Err(Refused(ErrorCode::UNAVAILABLE)))] {
+            assert_eq!(device.answer(&request, &mut out[..room]), len, "{room}");
+        }
+        assert_eq!(device.answer(&request, &mut []), Err(Refused(ErrorCode::UNAVAILABLE)));
+    }
+
+    #[test]
+    fn a_request_that_is_none_is_refused() {
+        let device = parameters();
+        for (text, code) in [
+            ("01", ErrorCode::WRITE_LENGTH),
+            ("01 03 00 01 10 01 03 96 00 00", ErrorCode::RANGE),
+            ("01 01 00 00", ErrorCode::RANGE),
+            ("01 01 00 02 10 01 03 96 00 00", ErrorCode::WRITE_LENGTH),
+            ("01 01 00 01 10 01 03 96 00", ErrorCode::WRITE_LENGTH),
+            ("01 01 00 01 10 01 03 96 00 00 00", ErrorCode::WRITE_LENGTH),
+            ("01 02 00 01 10 01 03 96 00 00", ErrorCode::WRITE_LENGTH),
+            ("01 02 00 01 10 01 03 96 00 00 06 02 00 01", ErrorCode::WRITE_LENGTH),
+            ("01 02 00 01 10 01 03 96 00 00 33 01 00 01", ErrorCode::TYPE),
+        ] {
+            assert_eq!(answered(&device, &hex(text)), Err(Refused(code)), "{text}");
+        }
+        assert_eq!(answered(&device, &[]), Err(Refused(ErrorCode::WRITE_LENGTH)));
+        let long = read(&[whole(&PARAMETERS[0]); MAX_COUNT + 1]);
+        assert_eq!(answered(&device, &long), Err(Refused(ErrorCode::WRITE_LENGTH)));
+        assert_eq!(Refused(ErrorCode::RANGE).to_string(), "parameter request refused: invalid range (B7)");
+    }
+
+    #[test]
+    fn the_sensor_format_is_that_of_the_position_in_force() {
+        for (scaling, steps_per_rev, xist1_shift, revolutions) in [
+            (None, 8192, 7, 4096),
+            (Some((8192, 1 << 25)), 8192, 7, 4096),
+            (Some((4096, 1 << 24)), 4096, 8, 4096),
+            (Some((100, 12_800)), 100, 18, 128),
+            (Some((100, 12_850)), 100, 18, 128),
+            (Some((100, 50)), 100, 26, 0),
+        ] {
+            let expected = SensorFormat { steps_per_rev, xist1_shift, xist2_shift: 0, revolutions };
+            assert_eq!(format(8192, 4096, scaling), expected, "{scaling:?}");
+        }
+        assert_eq!(format(8192, 1, None).revolutions, 1);
+        assert_eq!(format(1, 65_535, None).revolutions, 65_535);
+    }
+
+    /// Requests whose parts mostly make sense.
+    fn plausible() -> impl Strategy<Value = Vec<u8>> {
+        let attribute = prop_oneof![8 => Just(0x10u8), 1 => Just(0x20), 1 => Just(0x30), 1 => any::<u8>()];
+        let pnu = prop_oneof![9 => prop::sample::select(&[918u16, 922, 964, 965, 979][..]), 1 => any::<u16>()];
+        let subindex = prop_oneof![9 => 0u16..12, 1 => any::<u16>()];
+        let elements = prop_oneof![9 => 0u8..12, 1 => any::<u8>()];
+        let address = (attribute, elements, pnu, subindex)
+            .prop_map(|(attribute, elements, pnu, subindex)| ParameterAddress { attribute, elements, pnu, subindex });
+        let addresses = prop::collection::vec(address, 0..45);
+        (any::<u8>(), any::<bool>(), prop_oneof![9 => 0u8..2, 1 => any::<u8>()], addresses).prop_map(
+            |(reference, change, axis, addresses)| {
+                let id = if change { RequestId::Change } else { RequestId::Read };
+                let value = Values { format: Format::Unsigned8, data: &[1] };
+                let values: Vec<_> = addresses.iter().filter(|_| change).map(|_| value).collect();
+                let mut out = [0; 600];
+                let len = emit_request((reference, id, axis), &addresses, &values, &mut out).unwrap();
+                out[..len].to_vec()
+            },
+        )
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2048))]
+
+        #[test]
+        fn whatever_is_written_the_response_can_be_read(
+            request in prop_oneof![2 => plausible(), 1 => prop::collection::vec(any::<u8>(), 0..300)],
+            room in prop_oneof![1 => Just(300usize), 1 => 0usize..300],
+        ) {
+            let mut out = [0; 300];
+            let Ok(len) = parameters().answer(&request, &mut out[..room]) else { return Ok(()) };
+            prop_assert!(len <= room.min(MAX_LEN) && request.len() <= MAX_LEN);
+            let response = Response::parse(&out[..len]).expect("a response");
+            let request = Request::parse(&request).expect("what was answered");
+            prop_assert_eq!(response.reference, request.reference);
+            prop_assert_eq!(response.axis, request.axis);
+            prop_assert_eq!(usize::from(response.count), request.count());
+            let good = response.values().all(|values| values.error_number().is_none());
+            prop_assert_eq!(response.id, ResponseId::of(request.id, good));
+            prop_assert!(!good || request.id == RequestId::Read);
+            for (address, values) in request.addresses().zip(response.values()) {
+                match values.error_number() {
+                    Some(number) => prop_assert!(ErrorNumber::from_code(number).is_some()),
+                    None if values.format == Format::OctetString => prop_assert_eq!(values.count(), 2),
+                    None => prop_assert_eq!(values.count(), usize::from(address.elements).max(1)),
+                }
+            }
+        }
+
+        #[test]
+        fn the_sensor_format_finds_the_position_in_the_words(
+            raw in any::<u32>(),
+            (units, range) in (1u32..=8192).prop_flat_map(|units| (Just(units), 1..=units * 4096)),
+            scaled in any::<bool>(),
+        ) {
+            let scaling = scaled.then_some(Scaling { units_per_rev: units, total_range: range });
+            let position = Position::new(8192, 4096, CodeSequence::Cw, scaling).unwrap();
+            let (format, value) = (SensorFormat::of(&position), position.value(raw));
+            prop_assert_eq!(position.xist1(value) >> format.xist1_shift, value);
+            prop_assert_eq!(position.xist2(value) >> format.xist2_shift, value);
+            prop_assert!(u64::from(format.steps_per_rev) * u64::from(format.revolutions) <= position.range());
+        }
+    }
+}
