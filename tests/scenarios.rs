@@ -262,7 +262,7 @@ fn gc_jitter_outside() {
 /// Each loss of lock comes with a counter above 10 and at most 20, and takes the slave's sign of life away.
 fn assert_losses(run: &Run, slave: u8) {
     let mut last = 0;
-    let mut trips = 0;
+    let mut count = 0;
     for (_, station, what) in &run.observations {
         match *what {
             _ if *station != address(slave) => {}
@@ -270,14 +270,14 @@ fn assert_losses(run: &Run, slave: u8) {
             Observation::Pll { from: PllState::Locked, to } => {
                 assert_eq!(to, PllState::Waiting);
                 assert!((11..=20).contains(&last), "slave {slave}: counter {last}");
-                trips += 1;
+                count += 1;
             }
             _ => {}
         }
     }
-    assert!(trips > 200, "slave {slave}: {trips} losses");
-    let lost = |row: &&SlaveRow| row.phase == Phase::Clock;
-    assert!(run.slave(slave).filter(lost).all(|row| row.sls == 0 && row.mls == 0));
+    assert!(count > 200, "slave {slave}: {count} losses");
+    let searching = |row: &&SlaveRow| row.phase == Phase::Clock;
+    assert!(run.slave(slave).filter(searching).all(|row| row.sls == 0 && row.mls == 0));
 }
 
 /// Slave 3 tolerates one clock failure, slave 4 two. Clock 200 is missing, and clocks 300 and 301.
