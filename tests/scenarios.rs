@@ -488,7 +488,7 @@ fn fast_cycle() {
 
 /// SYNCH, every slave in address order, at most one Global_Control, at most one GAP poll, the token (Model: D6).
 fn assert_order(network: &Scenario, run: &Run, cycles: std::ops::Range<u64>) {
-    let mut polls = Vec::new();
+    let (mut polls, mut controls) = (Vec::new(), Vec::new());
     for cycle in cycles {
         let mut rest: Vec<_> = run.telegrams_in(cycle).map(|(.., octets)| Telegram::parse(octets)).collect();
         // SYNCH of the next cycle begins before that cycle does.
@@ -515,12 +515,13 @@ fn assert_order(network: &Scenario, run: &Run, cycles: std::ops::Range<u64>) {
                 other => panic!("{other:?}"),
             }
         }
-        if kinds.contains('g') {
-            polls.push(cycle);
-        }
+        polls.extend(kinds.contains('g').then_some(cycle));
+        controls.extend(kinds.contains('c').then_some(cycle));
         assert!(["t", "ct", "gt", "cgt"].contains(&kinds.as_str()), "cycle {cycle}: {kinds}");
     }
     assert!(polls.windows(2).all(|pair| pair[1] - pair[0] == 10), "every tenth cycle: {polls:?}");
+    // Operate at least every third of Data_Control_Time, 200 ms (Model: D5).
+    assert!(controls.len() > 1 && controls.windows(2).all(|pair| pair[1] - pair[0] == 66), "{controls:?}");
 }
 
 /// 32 stations are the most that one segment drives.
