@@ -2,4 +2,6 @@
 
 mod determinism;
 mod layers;
+mod manual;
+mod scenarios;
 mod support;
