@@ -4,7 +4,7 @@ use plotters::style::RGBColor;
 
 use super::Material;
 use super::chart::{Axis, Chart, short};
-use super::distribution::{Distribution, LinkLatencies};
+use super::distribution::{Distribution, Grid, LinkLatencies};
 use super::look::{
     Area, Canvas, Font, GREY, INK, Key, Swatch, VERMILION, Words, empty_page, fit, page, series, swatch, text_width,
 };
@@ -44,7 +44,7 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let how = if links.len() > MAX_LINKS {
         "Too many links to tell apart: the sum of all links and the link with the largest value."
     } else {
-        "One outline per link."
+        "One outline per link; where outlines coincide the last one is seen, the table names all."
     };
     let words = Words {
         title: "Publish latency: how old slave-to-slave data are, per link",
@@ -71,19 +71,17 @@ fn panel(canvas: &mut Canvas<'_>, area: Area, kind: &Kind, links: &[LinkLatencie
     canvas.text((area.left, area.top + 14), kind.title, Font::new(14).bold());
     let filled: Vec<&LinkLatencies> = links.iter().filter(|link| (kind.of)(link).range().is_some()).collect();
     let body = Area { top: area.top + 30, ..area };
-    let ranges = filled.iter().filter_map(|link| (kind.of)(link).range());
-    let Some((lo, hi)) = ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
+    let Some(grid) = Grid::over(filled.iter().map(|link| (kind.of)(link)), COLUMNS) else {
         canvas.text(body.centre(), "Nothing of this kind was recorded.", Font::new(14).middle().ink(GREY));
         return;
     };
-    let x = Axis::airy("latency [us]", lo, hi);
-    let (lo, hi) = (x.lo, x.hi);
-    let entries = entries(kind, &filled, lo, hi);
+    let x = Axis::airy("latency [us]", grid.left(0), grid.right());
+    let entries = entries(kind, &filled, &grid);
     let most = entries.iter().flat_map(|entry| entry.counts.iter().copied()).fold(0.0, f64::max);
     let outer = Area { right: area.right - TABLE, ..body };
     let chart = Chart::draw(canvas, outer, x, Axis::counts("cycles (logarithmic)", most));
     for entry in &entries {
-        chart.outline(canvas, lo, hi, &entry.counts, entry.key.colour);
+        chart.outline(canvas, &grid, &entry.counts, entry.key.colour);
     }
     table(canvas, Area { left: area.right - TABLE, ..body }, &entries);
 }
@@ -92,18 +90,19 @@ fn name(link: &LinkLatencies) -> String {
     format!("{} → {}", link.publisher, link.subscriber)
 }
 
-fn entries<'a>(kind: &Kind, links: &[&'a LinkLatencies], lo: f64, hi: f64) -> Vec<Entry<'a>> {
+fn entries<'a>(kind: &Kind, links: &[&'a LinkLatencies], grid: &Grid) -> Vec<Entry<'a>> {
     let entry = |label: String, link: &'a LinkLatencies, colour: RGBColor| {
         let of = (kind.of)(link);
-        Entry { key: Key::new(label, colour, Swatch::Line), counts: of.columns(lo, hi, COLUMNS), marks: Some(of) }
+        Entry { key: Key::new(label, colour, Swatch::Line), counts: of.columns(grid), marks: Some(of) }
     };
     if links.len() <= MAX_LINKS {
         let one = |(index, link): (usize, &&'a LinkLatencies)| entry(name(link), link, series(index).0);
         return links.iter().enumerate().map(one).collect();
     }
-    let mut sum = vec![0.0; COLUMNS];
+    let mut sum = Vec::new();
     for link in links {
-        let counts = (kind.of)(link).columns(lo, hi, COLUMNS);
+        let counts = (kind.of)(link).columns(grid);
+        sum.resize(counts.len(), 0.0);
         sum.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
     }
     let all = Key::new(format!("all {} links", links.len()), GREY, Swatch::Line);

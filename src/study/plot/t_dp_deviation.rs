@@ -3,6 +3,7 @@
 use super::Material;
 use super::buckets::{Buckets, Envelope};
 use super::chart::{Axis, Chart, short};
+use super::distribution::Grid;
 use super::look::{Area, BLUE, Canvas, Font, Key, Swatch, VERMILION, Words, empty_page, legend, page, spread};
 use crate::study::row::CycleRow;
 use crate::time::Span;
@@ -73,16 +74,16 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
 /// Level columns on the same axis, with marks at the right.
 fn histogram(canvas: &mut Canvas<'_>, outer: Area, y: Axis, material: &Material<'_>) {
     let counted = &material.distributions.t_dp_deviation;
-    let (lo, hi) = (y.lo, y.hi);
-    let counts = counted.columns(lo, hi, COLUMNS);
+    let grid = Grid::over(std::iter::once(counted), COLUMNS);
+    let counts = grid.as_ref().map_or_else(Vec::new, |grid| counted.columns(grid));
     let most = counts.iter().copied().fold(0.0, f64::max);
     let chart = Chart::draw(canvas, outer, Axis::counts("cycles (logarithmic)", most), y);
-    let width = (hi - lo) / COLUMNS as f64;
-    for (index, &count) in counts.iter().enumerate().filter(|column| *column.1 > 0.0) {
-        let low = lo + index as f64 * width;
-        let right = chart.x(count).max(chart.area.left + 1);
-        let bar = Area { left: chart.area.left, top: chart.y(low + width), right, bottom: chart.y(low) };
-        canvas.fill(bar, BLUE);
+    if let Some(grid) = grid {
+        for (index, &count) in counts.iter().enumerate().filter(|column| *column.1 > 0.0) {
+            let (left, right) = (chart.area.left, chart.x(count).max(chart.area.left + 1));
+            let (top, bottom) = (chart.y(grid.left(index + 1)), chart.y(grid.left(index)));
+            canvas.fill(Area { left, top, right, bottom }, BLUE);
+        }
     }
     let mut marks: Vec<&(String, f64)> = counted.marks.iter().collect();
     marks.sort_by(|a, b| b.1.total_cmp(&a.1));
