@@ -7,7 +7,7 @@ use super::chart::{Axis, Ruler, plain};
 use super::lanes::Lanes;
 use super::look::{
     Area, BLACK, BLUE, Canvas, FAINT, Font, GREEN, GREY, INK, Key, ORANGE, PURPLE, SKY, Shape, Swatch, VERMILION,
-    WHITE, WIDTH, Words, empty_page, fit, legend, legend_height, page, spread, text_width,
+    WHITE, WIDTH, Words, counted, empty_page, fit, legend, legend_height, page, spread, text_width,
 };
 use super::telegrams::{Bar, Cycle, Kind};
 use crate::time::Time;
@@ -155,13 +155,13 @@ fn subtitle(view: &View<'_>) -> String {
     let number = view.cycle.number.map_or_else(String::new, |number| format!("cycle {number}, "));
     let dropped = match view.cycle.dropped {
         0 => String::new(),
-        more => format!(" {more} telegrams more are not shown."),
+        more => format!(" {more} more are not shown."),
     };
     format!(
-        "{number}{} slaves, {} telegrams, from SYNCH to the next SYNCH; t0 is the last bit of SYNCH, at {} s of the \
+        "{number}{}, {}, from SYNCH to the next SYNCH; t0 is the last bit of SYNCH, at {} s of the \
          run. Instants at the sender; a telegram shorter than a pixel is one pixel wide.{dropped}",
-        view.slaves.len(),
-        view.cycle.bars.len(),
+        counted(view.slaves.len() as u64, "slave"),
+        counted(view.cycle.bars.len() as u64, "telegram"),
         plain(view.t0.since_zero().as_s(), 6),
     )
 }

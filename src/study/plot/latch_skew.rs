@@ -3,7 +3,7 @@
 use super::Material;
 use super::chart::{Axis, Chart};
 use super::distribution::Grid;
-use super::look::{Area, BLUE, Key, Swatch, VERMILION, Words, empty_page, legend, page};
+use super::look::{Area, BLUE, Key, Swatch, VERMILION, Words, counted, empty_page, legend, page};
 
 const COLUMNS: usize = 120;
 
@@ -13,14 +13,14 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let mut words = Words {
         title: "Latch skew: largest minus smallest latch instant of the locked slaves in one cycle",
         subtitle: format!(
-            "{} cycles with at least two locked slaves, of {} slaves in all. Height: cycles per column, logarithmic.",
-            skew.count,
-            material.meta.slaves.len()
+            "{} with at least two locked slaves, of {} in all. Height: cycles per column, logarithmic.",
+            counted(skew.count, "cycle"),
+            counted(material.meta.slaves.len() as u64, "slave")
         ),
         plotted: "latch skew per cycle, histogram",
     };
     let Some(grid) = Grid::over(std::iter::once(skew), COLUMNS) else {
-        "Histogram over all cycles.".clone_into(&mut words.subtitle);
+        "histogram over all cycles.".clone_into(&mut words.subtitle);
         let why = "No latch skew was recorded: in no cycle were two slaves locked to the clock at once.";
         return empty_page(material.meta, &words, why);
     };

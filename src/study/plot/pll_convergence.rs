@@ -3,7 +3,8 @@
 use super::Material;
 use super::chart::{Axis, Chart};
 use super::look::{
-    Area, BLACK, BLUE, Canvas, GREY, Key, MAX_SERIES, SKY, Swatch, VERMILION, Words, empty_page, legend, page, series,
+    Area, BLACK, BLUE, Canvas, GREY, Key, MAX_SERIES, SKY, Swatch, VERMILION, Words, counted, empty_page, legend, page,
+    series,
 };
 use crate::observation::PllState;
 use crate::study::row::SlaveRow;
@@ -87,9 +88,10 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let words = Words {
         title: "PLL convergence: arrival of SYNCH minus its prediction during start-up, and the clock window",
         subtitle: format!(
-            "{started} of {} slaves started their clock recovery, {locked} locked. First {cycles} cycles, counted from \
+            "{started} of {} started the clock recovery, {locked} locked. First {}, counted from \
              each slave's own first clock. {how} Above ±{LINEAR} ns the axis is logarithmic.",
-            material.meta.slaves.len()
+            counted(material.meta.slaves.len() as u64, "slave"),
+            counted(cycles as u64, "cycle"),
         ),
         plotted: "PLL error and window of each slave's first start-up",
     };

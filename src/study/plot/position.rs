@@ -6,7 +6,8 @@ use super::buckets::{Buckets, Envelope};
 use super::chart::{Axis, Chart, Ruler, plain};
 use super::lanes::Lanes;
 use super::look::{
-    Area, BLUE, Canvas, Font, Key, MAX_SERIES, PALE, Swatch, WIDTH, Words, empty_page, legend, legend_height, page,
+    Area, BLUE, Canvas, Font, Key, MAX_SERIES, PALE, Swatch, WIDTH, Words, counted, empty_page, legend, legend_height,
+    page,
 };
 use super::{Material, PlotMeta};
 use crate::study::row::SlaveRow;
@@ -80,7 +81,7 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     };
     let words = Words {
         title: "Position: G1_XIST1 as latched by each slave with a locked clock",
-        subtitle: format!("{} of {} slaves. {how}", tracks.len(), material.meta.slaves.len()),
+        subtitle: format!("{} of {}. {how}", tracks.len(), counted(material.meta.slaves.len() as u64, "slave")),
         plotted: "latched G1_XIST1 over time",
     };
     if tracks.is_empty() {

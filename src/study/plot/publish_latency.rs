@@ -6,7 +6,8 @@ use super::Material;
 use super::chart::{Axis, Chart, short};
 use super::distribution::{Distribution, Grid, LinkLatencies};
 use super::look::{
-    Area, Canvas, Font, GREY, INK, Key, Swatch, VERMILION, Words, empty_page, fit, page, series, swatch, text_width,
+    Area, BLUE, Canvas, Font, GREY, INK, Key, Swatch, VERMILION, Words, counted, empty_page, fit, page, series, swatch,
+    text_width,
 };
 
 const COLUMNS: usize = 100;
@@ -42,13 +43,13 @@ struct Entry<'a> {
 pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let links = &material.distributions.links;
     let how = if links.len() > MAX_LINKS {
-        "Too many links to tell apart: the sum of all links and the link with the largest value."
+        "Too many links to tell apart: the sum of all links and the links with the smallest and the largest maximum."
     } else {
         "One outline per link; where outlines coincide the last one is seen, the table names all."
     };
     let words = Words {
         title: "Publish latency: how old slave-to-slave data are, per link",
-        subtitle: format!("{} links. {how} Height: cycles per column, logarithmic.", links.len()),
+        subtitle: format!("{}. {how} Height: cycles per column, logarithmic.", counted(links.len() as u64, "link")),
         plotted: "wire latency, publish latency and age at use per link, histograms",
     };
     if links.iter().all(|link| KINDS.iter().all(|kind| (kind.of)(link).range().is_none())) {
@@ -107,6 +108,8 @@ fn entries<'a>(kind: &Kind, links: &[&'a LinkLatencies], grid: &Grid) -> Vec<Ent
     }
     let all = Key::new(format!("all {} links", links.len()), GREY, Swatch::Line);
     let mut entries = vec![Entry { key: all, counts: sum, marks: None }];
+    let best = links.iter().copied().reduce(|a, b| if (kind.of)(b).top() < (kind.of)(a).top() { b } else { a });
+    entries.extend(best.map(|link| entry(format!("smallest: {}", name(link)), link, BLUE)));
     let worst = links.iter().copied().reduce(|a, b| if (kind.of)(b).top() > (kind.of)(a).top() { b } else { a });
     entries.extend(worst.map(|link| entry(format!("largest: {}", name(link)), link, VERMILION)));
     entries

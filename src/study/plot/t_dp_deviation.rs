@@ -4,7 +4,9 @@ use super::Material;
 use super::buckets::{Buckets, Envelope};
 use super::chart::{Axis, Chart, short};
 use super::distribution::Grid;
-use super::look::{Area, BLUE, Canvas, Font, Key, Swatch, VERMILION, Words, empty_page, legend, page, spread};
+use super::look::{
+    Area, BLUE, Canvas, Font, Key, Swatch, VERMILION, Words, counted as plural, empty_page, legend, page, spread,
+};
 use crate::study::row::CycleRow;
 use crate::time::Span;
 
@@ -38,7 +40,10 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let shown = if each == 1 { "every cycle".to_owned() } else { format!("smallest and largest of {each} cycles") };
     let words = Words {
         title: "T_DP deviation: length of each cycle minus the nominal T_DP",
-        subtitle: format!("left: over time, {shown}; right: histogram of {} cycles, same axis.", counted.count),
+        subtitle: format!(
+            "left: over time, {shown}; right: histogram of {}, same axis.",
+            plural(counted.count, "cycle")
+        ),
         plotted: "deviation of each cycle's length, over time and histogram",
     };
     if over_time.is_empty() {
@@ -66,7 +71,12 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
         let end = points.last().map_or(cycle, |point| point.0 + cycle * each as f64);
         let x = Axis::linear(format!("time [{unit}]"), 0.0, end);
         let chart = Chart::draw(canvas, Area { right: split, ..area }, x, y.clone());
-        chart.band(canvas, &points, cycle * each as f64, BLUE, 0.6);
+        if each == 1 {
+            let line: Vec<(i32, i32)> = points.iter().map(|point| chart.at(point.0, point.1)).collect();
+            canvas.path(&line, BLUE, 1);
+        } else {
+            chart.band(canvas, &points, cycle * each as f64, BLUE, 0.6);
+        }
         histogram(canvas, Area { left: split, right: area.right - LABELS, ..area }, y, material);
     })
 }
@@ -85,7 +95,7 @@ fn histogram(canvas: &mut Canvas<'_>, outer: Area, y: Axis, material: &Material<
             canvas.fill(Area { left, top, right, bottom }, BLUE);
         }
     }
-    let mut marks: Vec<&(String, f64)> = counted.marks.iter().collect();
+    let mut marks: Vec<&(String, f64)> = counted.marks.iter().rev().collect();
     marks.sort_by(|a, b| b.1.total_cmp(&a.1));
     let wanted: Vec<(i32, i32)> = marks.iter().map(|mark| (chart.y(mark.1), 18)).collect();
     let places = spread(&wanted, chart.area.top - 8, chart.area.bottom + 30);

@@ -8,7 +8,7 @@ use super::chart::{Axis, Ruler};
 use super::lanes::Lanes;
 use super::look::{
     Area, BLACK, BLUE, Canvas, FAINT, Font, GREEN, GREY, INK, Key, ORANGE, PURPLE, SKY, Swatch, VERMILION, WIDTH,
-    Words, empty_page, legend, legend_height, page,
+    Words, counted, empty_page, legend, legend_height, page,
 };
 use crate::observation::{Observation, Phase, SlaveState};
 use crate::study::row::{EventRow, SlaveRow};
@@ -166,8 +166,10 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let words = Words {
         title: "Timeline: start-up phases, faults and disturbances of every slave",
         subtitle: format!(
-            "{slaves} slaves, {cycles} cycles. {split}Each piece of time shows its lowest phase; a mark is at least \
-             {MARK} pixels wide, and marks that meet stand side by side. Numbers at the right: totals of the run."
+            "{}, {}. {split}Each piece of time shows its lowest phase; a mark is at least \
+             {MARK} pixels wide, and marks that meet stand side by side. Numbers at the right: totals of the run.",
+            counted(slaves as u64, "slave"),
+            counted(cycles, "cycle"),
         ),
         plotted: "phases, faults, acknowledgements and disturbances per slave",
     };
