@@ -1,3 +1,132 @@
 //! The command line `isodp`.
 
-fn main() {}
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use clap::{Args, Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use isodp::sim::network::NetworkEvent;
+use isodp::sim::queue::NearQueue;
+use isodp::study::report;
+use isodp::study::run::{Outcome, Progress, run};
+use isodp::study::scenario::{Extent, Scenario};
+use isodp::time::Span;
+
+/// A wrong call, scenario or file.
+const USAGE: u8 = 2;
+
+const EXAMPLES: &str = "\
+Examples:
+  isodp run scenarios/reference.toml
+      The main job: a complete network, its figures on screen, files under out/reference/.
+  isodp run scenarios/reference.toml --seed 7 --out /tmp/results
+      The same with other draws, files under /tmp/results/reference/.
+  isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
+      The same with changed parameters; slaves are named by their address.
+
+Exit codes: 0 done, 2 wrong usage, scenario or file.";
+
+/// Simulates isochronous PROFIBUS DP (DP-V2) networks, telegram by telegram, in deterministic time.
+#[derive(Parser)]
+#[command(version, about, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Runs a scenario and leaves figures, tables, histograms and plots.
+    #[command(after_help = EXAMPLES)]
+    Run(RunArgs),
+}
+
+#[derive(Args)]
+struct RunArgs {
+    /// Scenario file (TOML).
+    #[arg(value_name = "FILE")]
+    scenario: PathBuf,
+    /// Seed of all random streams, instead of the scenario's.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Directory for the results; they go to DIR/<scenario>/.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    sets: Vec<(String, String)>,
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
+        _ => Err(format!("{text:?} is no KEY=VALUE, such as master.t_o='1.5 ms'")),
+    }
+}
+
+fn main() -> ExitCode {
+    let Command::Run(args) = Cli::parse().command;
+    match run_command(args) {
+        Ok(text) => {
+            anstream::print!("{text}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            anstream::eprintln!("error: {error}");
+            ExitCode::from(USAGE)
+        }
+    }
+}
+
+fn run_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
+    let mut sets = args.sets;
+    sets.extend(args.seed.map(|seed| ("run.seed".to_owned(), seed.to_string())));
+    let scenario = Scenario::load(&args.scenario, &sets)?;
+    let bar = Bar::new(&scenario);
+    let Outcome { summary, dir, .. } = run::<NearQueue<NetworkEvent>>(&scenario, Some(&args.out), |at| bar.show(at))?;
+    bar.line.finish_and_clear();
+    Ok(report::render(&summary, dir.as_ref().map(|dir| dir.display().to_string()).as_deref()))
+}
+
+/// The progress bar; nothing where standard error is no terminal.
+struct Bar {
+    line: ProgressBar,
+    end: Option<Span>,
+    cycles: Option<u64>,
+    started: Instant,
+}
+
+impl Bar {
+    /// Positions are thousandths of the run.
+    const LENGTH: u64 = 1_000;
+
+    fn new(scenario: &Scenario) -> Self {
+        let (end, cycles) = match scenario.run.duration {
+            Extent::Time(span) => (Some(span), None),
+            Extent::Cycles(cycles) => (None, Some(cycles)),
+        };
+        let target = ProgressDrawTarget::stderr();
+        let bar = ProgressBar::with_draw_target(Some(Self::LENGTH), target);
+        let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3} %  {msg}  {eta} left");
+        bar.set_style(style.expect("a template that is right").progress_chars("=> "));
+        bar.set_prefix(scenario.name.clone());
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self { line: bar, end, cycles, started: Instant::now() }
+    }
+
+    fn show(&self, at: Progress) {
+        let share = match (self.end, self.cycles) {
+            (Some(end), _) => at.simulated.as_s() / end.as_s(),
+            (_, Some(cycles)) => at.cycles as f64 / cycles.max(1) as f64,
+            _ => 1.0,
+        };
+        self.line.set_position((share * Self::LENGTH as f64) as u64);
+        let speed = at.simulated.as_s() / self.started.elapsed().as_secs_f64().max(1e-9);
+        self.line.set_message(format!(
+            "{:.1} s simulated, cycle {}, {speed:.0} x real time",
+            at.simulated.as_s(),
+            at.cycles
+        ));
+    }
+}

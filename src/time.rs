@@ -51,23 +51,24 @@ impl Span {
     pub const fn ticks(self) -> i64 {
         self.0
     }
-    /// Length [ns], for display and statistics.
+    /// Length (ns), for display and statistics.
     pub fn as_ns(self) -> f64 {
         self.0 as f64 / Self::TICKS_PER_NS as f64
     }
-    /// Length [µs], for display and statistics.
+    /// Length (µs), for display and statistics.
     pub fn as_us(self) -> f64 {
         self.as_ns() / 1e3
     }
-    /// Length [ms], for display and statistics.
+    /// Length (ms), for display and statistics.
     pub fn as_ms(self) -> f64 {
         self.as_ns() / 1e6
     }
-    /// Length [s], for display and statistics.
+    /// Length (s), for display and statistics.
     pub fn as_s(self) -> f64 {
         self.as_ns() / 1e9
     }
     /// Magnitude. Only for comparing with a half width; a signed quantity is recorded with its sign.
+    #[must_use]
     pub const fn abs(self) -> Self {
         Self(self.0.abs())
     }
@@ -76,6 +77,7 @@ impl Span {
         self.0.div_euclid(step.0)
     }
     /// The next multiple of `step` not below this span.
+    #[must_use]
     pub const fn ceil_to(self, step: Self) -> Self {
         Self((self.0 + step.0 - 1).div_euclid(step.0) * step.0)
     }
@@ -234,7 +236,7 @@ impl<C> fmt::Debug for Instant<C> {
     }
 }
 
-/// A duration counted in bits [t_bit]. It becomes a [`Span`] only together with a [`BitRate`].
+/// A duration counted in bits (t_bit). It becomes a [`Span`] only together with a [`BitRate`].
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Debug)]
 pub struct Tbit(pub u32);
 

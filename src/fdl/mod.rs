@@ -38,11 +38,30 @@ pub enum Input<'a, C> {
     /// The last bit of the telegram that asked for it ([`Outbox::send_clock`]) has left this station.
     Sent,
     /// An armed deadline came due.
-    Deadline(Timer),
-    /// The instant of [`Outbox::sample_at`] came; the shaft was at this raw position [steps].
+    Deadline {
+        /// Which one.
+        timer: Timer,
+        /// Whether this station's receiver sees characters on the line at this instant.
+        busy: bool,
+    },
+    /// The instant of [`Outbox::sample_at`] came; the shaft was at this raw position (steps).
     Sample(u32),
     /// The scenario orders something.
     Command(C),
+}
+
+impl<'a, C> Input<'a, C> {
+    /// The same input with its command translated; none where the command has no translation.
+    pub fn map_command<D>(self, translate: impl FnOnce(C) -> Option<D>) -> Option<Input<'a, D>> {
+        Some(match self {
+            Self::PowerOn => Input::PowerOn,
+            Self::Telegram(heard) => Input::Telegram(heard),
+            Self::Sent => Input::Sent,
+            Self::Deadline { timer, busy } => Input::Deadline { timer, busy },
+            Self::Sample(raw) => Input::Sample(raw),
+            Self::Command(command) => Input::Command(translate(command)?),
+        })
+    }
 }
 
 /// A telegram as it arrived.
@@ -50,7 +69,7 @@ pub enum Input<'a, C> {
 pub struct Heard<'a> {
     /// The characters, start delimiter to end delimiter.
     pub octets: &'a [u8],
-    /// Raw position of the shaft [steps] at this instant, if the station has asked for it
+    /// Raw position of the shaft (steps) at this instant, if the station has asked for it
     /// ([`Outbox::sample_with_telegrams`]); zero otherwise.
     pub sample: u32,
 }
@@ -75,18 +94,41 @@ impl Filter {
     pub const fn all(own: Address) -> Self {
         Self { all: true, own, publishers: 0 }
     }
-    /// Whether a telegram with these octets passes. Looks at the octets as they are, disturbed or not.
+    /// Whether a telegram with this route passes; without a route only stations that hear everything get it.
     #[inline]
-    pub fn passes(&self, octets: &[u8]) -> bool {
-        // Destination and source sit at 1, 2 behind SD1, SD3 and SD4 and at 4, 5 behind SD2; bit 7 announces a SAP.
-        let (da, sa, fc) = match octets {
-            [0x68, _, _, _, da, sa, fc, ..] | [0x10 | 0xA2, da, sa, fc, ..] => (da & 0x7F, sa & 0x7F, *fc),
-            _ => return self.all,
-        };
-        let is_reply = fc & 0x40 == 0;
+    pub fn passes(&self, route: Option<Route>) -> bool {
         self.all
-            || da == self.own.get()
-            || (da == Address::BROADCAST.get() && (!is_reply || self.publishers >> sa & 1 == 1))
+            || route.is_some_and(|Route { da, sa, reply }| {
+                da == self.own.get() || (da == Route::TO_ALL && (!reply || self.publishers >> sa & 1 == 1))
+            })
+    }
+}
+
+/// The octets of a telegram that decide who takes it, as they are, disturbed or not.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Route {
+    /// Destination, 0..=127.
+    pub da: u8,
+    /// Source, 0..=127.
+    pub sa: u8,
+    /// Sent without the token: FC bit 6 is 0.
+    pub reply: bool,
+}
+
+impl Route {
+    /// Destination of broadcasts.
+    pub const TO_ALL: u8 = Address::BROADCAST.get();
+
+    /// Reads the route. None for SC, the token and what does not begin as a telegram: only active stations care.
+    #[inline]
+    pub fn of(octets: &[u8]) -> Option<Self> {
+        // Destination, source and FC sit at 1 behind SD1 and SD3 and at 4 behind SD2; bit 7 announces a SAP.
+        match *octets {
+            [0x68, _, _, _, da, sa, fc, ..] | [0x10 | 0xA2, da, sa, fc, ..] => {
+                Some(Self { da: da & 0x7F, sa: sa & 0x7F, reply: fc & 0x40 == 0 })
+            }
+            _ => None,
+        }
     }
 }
 
@@ -104,11 +146,13 @@ pub enum Timer {
     Window,
     /// T_O.
     SetPoint,
+    /// The LEDs may change because nothing was heard.
+    Leds,
 }
 
 impl Timer {
     /// Every timer, in the order of their numbers.
-    pub const ALL: [Self; 5] = [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint];
+    pub const ALL: [Self; 6] = [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint, Self::Leds];
 }
 
 /// A station's answer to one input. Reused from step to step, so that no step allocates.
@@ -151,8 +195,8 @@ impl Default for Outbox {
 }
 
 impl Outbox {
-    /// Observations that one step may make. A step that needs more is a bug.
-    pub const MAX_OBSERVATIONS: usize = 16;
+    /// Observations that one step may make: a few for each of 126 stations. A step that needs more is a bug.
+    pub const MAX_OBSERVATIONS: usize = 160;
 
     /// An empty outbox.
     pub const fn new() -> Self {
@@ -177,6 +221,9 @@ impl Outbox {
     }
 
     /// Sends the telegram that `fill` writes, its first bit at `at`. One telegram per step.
+    ///
+    /// # Panics
+    /// When this step has sent one already.
     pub fn send(&mut self, at: Local, fill: impl FnOnce(&mut Frame)) {
         assert!(self.send.is_none(), "a step sends one telegram at most");
         fill(&mut self.frame);

@@ -16,7 +16,7 @@ const BILLION: i128 = 1_000_000_000;
 /// Why a crystal cannot be built or changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum CrystalError {
-    /// The offset [ppb] lies outside of ±[`Crystal::MAX_PPB`].
+    /// The offset, in ppb, lies outside of ±[`Crystal::MAX_PPB`].
     #[error("a crystal offset of {0} ppb is outside of ±{max} ppb", max = Crystal::MAX_PPB)]
     Offset(i64),
 }
@@ -39,7 +39,7 @@ pub struct Crystal {
 }
 
 impl Crystal {
-    /// Largest offset of a crystal [ppb], 1000 ppm. Model: ten times what a poor oscillator shows.
+    /// Largest offset of a crystal [parts per billion], 1000 ppm. Model: ten times what a poor oscillator shows.
     pub const MAX_PPB: i64 = 1_000_000;
 
     /// A crystal `ppb` [parts per billion] fast that shows `start` at true time zero.

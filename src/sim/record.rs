@@ -31,7 +31,8 @@ pub struct Stamp<'a> {
 
 /// Reads a run while it happens.
 pub trait Recorder {
-    /// A telegram was put on the line. Comes when it starts.
+    /// A telegram will be on the line. Comes when its sender decides so, at or before its first bit; telegrams that do
+    /// not overlap come in the order of their starts.
     fn telegram(&mut self, telegram: &Transmission<'_>);
     /// A station observed something.
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation);
@@ -50,6 +51,19 @@ impl<A: Recorder, B: Recorder> Recorder for (A, B) {
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         self.0.observe(stamp, what);
         self.1.observe(stamp, what);
+    }
+}
+
+impl<R: Recorder> Recorder for Option<R> {
+    fn telegram(&mut self, telegram: &Transmission<'_>) {
+        if let Some(recorder) = self {
+            recorder.telegram(telegram);
+        }
+    }
+    fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+        if let Some(recorder) = self {
+            recorder.observe(stamp, what);
+        }
     }
 }
 

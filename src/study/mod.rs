@@ -1,5 +1,19 @@
 //! Studies: scenario files, runs, what they record, and what is made of it. The only layer that knows files,
 //! threads and reports.
 
+pub mod build;
+pub mod count;
+pub mod export;
+pub mod histogram;
+pub mod layout;
+pub mod metric;
+pub mod plan;
 pub mod plot;
+pub mod quantity;
+pub mod report;
 pub mod row;
+pub mod run;
+#[cfg(test)]
+mod sample;
+pub mod scenario;
+pub mod summary;

@@ -21,7 +21,7 @@ pub struct CycleRow {
     pub t_dx: Option<Span>,
     /// Largest minus smallest latch offset over the locked slaves (Model: D9); none with fewer than two.
     pub latch_skew: Option<Span>,
-    /// The same in counts: largest minus smallest latch offset x speed of the slave's shaft [steps].
+    /// The same in counts: largest minus smallest latch offset x speed of the slave's shaft (steps).
     pub skew_counts: Option<f64>,
     /// Repeated requests.
     pub retries: u32,
@@ -131,6 +131,28 @@ impl<A: Sink, B: Sink> Sink for (A, B) {
     }
 }
 impl Sink for () {}
+impl<S: Sink> Sink for Option<S> {
+    fn cycle(&mut self, row: &CycleRow) {
+        if let Some(sink) = self {
+            sink.cycle(row);
+        }
+    }
+    fn slave(&mut self, row: &SlaveRow) {
+        if let Some(sink) = self {
+            sink.slave(row);
+        }
+    }
+    fn link(&mut self, row: &LinkRow) {
+        if let Some(sink) = self {
+            sink.link(row);
+        }
+    }
+    fn event(&mut self, row: &EventRow) {
+        if let Some(sink) = self {
+            sink.event(row);
+        }
+    }
+}
 impl<S: Sink + ?Sized> Sink for &mut S {
     fn cycle(&mut self, row: &CycleRow) {
         (**self).cycle(row);

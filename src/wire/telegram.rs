@@ -191,7 +191,7 @@ pub enum TelegramError {
         /// The octet in its place.
         found: u8,
     },
-    /// The frame is longer or shorter than its start and its LE say [octets].
+    /// The frame is longer or shorter than its start and its LE say (octets).
     Length {
         /// The right length; for an SD2 cut off before its second start delimiter, the least.
         expected: usize,
@@ -256,7 +256,7 @@ pub enum TelegramError {
         /// The extension octet.
         found: u8,
     },
-    /// The data unit to write does not fit [octets].
+    /// The data unit to write does not fit (octets).
     DataUnit {
         /// The longest that fits behind these service access points.
         most: usize,
@@ -339,7 +339,7 @@ impl Frame {
     pub fn octets_mut(&mut self) -> &mut [u8] {
         &mut self.octets[..usize::from(self.len)]
     }
-    /// Length [octets].
+    /// Length (octets).
     pub const fn len(&self) -> usize {
         self.len as usize
     }
@@ -382,8 +382,9 @@ impl Frame {
     /// # Errors
     /// A source of 127, a service access point above 63, or a data unit that does not fit. The frame is then unchanged.
     pub fn set_data(&mut self, header: &Header, du: &[u8]) -> Result<(), TelegramError> {
-        self.start_data(header, du.len())?.copy_from_slice(du);
-        self.finish_data();
+        let (head, place) = self.start_data(header, du.len())?;
+        place.copy_from_slice(du);
+        self.finish_data(head.wrapping_add(sum(du)));
         Ok(())
     }
     /// As [`Frame::set_data`], with `write` filling the `len` octets of the data unit in place. They start as zero.
@@ -396,10 +397,11 @@ impl Frame {
         len: usize,
         write: impl FnOnce(&mut [u8]),
     ) -> Result<(), TelegramError> {
-        let du = self.start_data(header, len)?;
+        let (head, du) = self.start_data(header, len)?;
         du.fill(0);
         write(du);
-        self.finish_data();
+        let fcs = head.wrapping_add(sum(du));
+        self.finish_data(fcs);
         Ok(())
     }
     /// Becomes an SD3, for tests of receivers: stations here answer with SD2.
@@ -422,8 +424,9 @@ impl Frame {
         self.octets[..N].copy_from_slice(&head);
         self.len = N as u8;
     }
-    /// Writes everything before the data unit; the data unit's place.
-    fn start_data(&mut self, header: &Header, len: usize) -> Result<&mut [u8], TelegramError> {
+    /// Writes everything before the data unit; its share of FCS, and the data unit's place. FCS is not summed up from
+    /// the frame: reading octets just written one by one is the slowest thing one can do here.
+    fn start_data(&mut self, header: &Header, len: usize) -> Result<(u8, &mut [u8]), TelegramError> {
         let saps = header.sap_octets();
         let most = MAX_DU - saps;
         if len > most {
@@ -446,19 +449,19 @@ impl Frame {
             self.octets[..head + FIXED].copy_from_slice(&[SD2, le, le, SD2, da, sa, fc]);
         }
         let mut at = head + FIXED;
+        let mut fcs = da.wrapping_add(sa).wrapping_add(fc);
         for sap in [header.dsap, header.ssap].into_iter().flatten() {
             self.octets[at] = sap.0;
+            fcs = fcs.wrapping_add(sap.0);
             at += 1;
         }
         self.len = (at + len + TAIL) as u8;
-        Ok(&mut self.octets[at..at + len])
+        Ok((fcs, &mut self.octets[at..at + len]))
     }
-    /// Writes FCS and ED once the data unit is in its place.
-    fn finish_data(&mut self) {
-        let head = if self.octets[0] == SD1 { 1 } else { SD2_HEAD };
+    /// Writes FCS and ED behind the data unit.
+    fn finish_data(&mut self, fcs: u8) {
         let end = self.len() - TAIL;
-        self.octets[end] = sum(&self.octets[head..end]);
-        self.octets[end + 1] = ED;
+        self.octets[end..end + TAIL].copy_from_slice(&[fcs, ED]);
     }
 }
 impl Default for Frame {

@@ -1,0 +1,211 @@
+//! The master application: a sign of life and a sensor control word for each slave, and a check of the slaves' signs.
+//!
+//! Model: D17. The application counts its sign of life per T_MAPC from the cycle on in which a slave exchanges data
+//! and the master operates, and checks the slave's by the same rule with a tolerance of four.
+
+use alloc::vec::Vec;
+
+use crate::device::parameter_client::ParameterClient;
+use crate::device::sign_of_life::{LifeSign, Monitor, MonitorSettings};
+use crate::dp::master::Application;
+use crate::dp::ms1::{Failure, Job};
+use crate::fdl::Outbox;
+use crate::observation::{LifeState, MasterMode, Observation};
+use crate::wire::Address;
+use crate::wire::drive::{G1Stw, Inputs81, Outputs81, Stw2};
+use crate::wire::parameter::{Format, ParameterAddress};
+
+/// Tolerated failures of a slave's sign of life (Model: D17).
+const TOLERANCE: u16 = 4;
+/// Cycles for which an acknowledgement is held: its answer shows two cycles later at the latest (Model: D10).
+const ACKNOWLEDGE_CYCLES: u8 = 4;
+
+/// What the scenario may order the application to do.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Command {
+    /// Set G1_STW bit 15 for a few cycles (manual 2.2).
+    Acknowledge(Address),
+    /// Put these bits into G1_STW until the next such order.
+    ControlWord(Address, G1Stw),
+    /// Count the sign of life no further, for so many cycles or for good.
+    HoldLife(Address, Option<u32>),
+    /// Count again.
+    ReleaseLife(Address),
+    /// Go on counting from this value.
+    JumpLife(Address, u8),
+    /// Ask for a parameter over the parameter channel (manual 4).
+    ReadParameter(Address, ParameterAddress),
+    /// Ask to change a parameter to this value of this format.
+    ChangeParameter(Address, ParameterAddress, Format, u32),
+}
+
+impl Command {
+    /// The slave that is meant.
+    pub const fn slave(&self) -> Address {
+        match *self {
+            Self::Acknowledge(slave)
+            | Self::ControlWord(slave, _)
+            | Self::HoldLife(slave, _)
+            | Self::ReleaseLife(slave)
+            | Self::JumpLife(slave, _)
+            | Self::ReadParameter(slave, _)
+            | Self::ChangeParameter(slave, ..) => slave,
+        }
+    }
+}
+
+/// What the application keeps of one slave.
+#[derive(Clone, Debug)]
+struct Axis {
+    slave: Address,
+    joined: bool,
+    /// Own sign of life for this slave and the cycles for which it has been sent.
+    sign: LifeSign,
+    age: u8,
+    held: Held,
+    control: G1Stw,
+    acknowledge: u8,
+    monitor: Monitor,
+    /// Sign of life last received; it counts again where nothing comes.
+    received: LifeSign,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Held {
+    No,
+    For(u32),
+    ForGood,
+}
+
+/// The master application.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    axes: Vec<Axis>,
+    t_mapc: u8,
+    start: LifeSign,
+    parameters: ParameterClient,
+}
+
+impl Controller {
+    /// An application for these slaves, counting every `t_mapc` cycles (1..=14) from `start` on (1..=15).
+    pub fn new(slaves: impl IntoIterator<Item = Address>, t_mapc: u8, start: u8) -> Self {
+        let axis = |slave| Axis {
+            slave,
+            joined: false,
+            sign: LifeSign::INVALID,
+            age: 0,
+            held: Held::No,
+            control: G1Stw::default(),
+            acknowledge: 0,
+            monitor: Monitor::new(MonitorSettings::new(1, TOLERANCE)),
+            received: LifeSign::INVALID,
+        };
+        Self {
+            axes: slaves.into_iter().map(axis).collect(),
+            t_mapc,
+            start: LifeSign::new(start),
+            parameters: ParameterClient::default(),
+        }
+    }
+    /// State of the check of a slave's sign of life.
+    pub fn slave_life(&self, slave: Address) -> Option<LifeState> {
+        self.axes.iter().find(|axis| axis.slave == slave).map(|axis| axis.monitor.state())
+    }
+}
+
+impl Axis {
+    /// One cycle of the sign of life.
+    fn count(&mut self, t_mapc: u8, start: LifeSign, out: &mut Outbox) {
+        if let Held::For(cycles) = self.held {
+            if cycles == 0 {
+                self.hold(Held::No, out);
+            } else {
+                self.held = Held::For(cycles - 1);
+            }
+        }
+        self.acknowledge = self.acknowledge.saturating_sub(1);
+        if !self.sign.is_valid() {
+            (self.sign, self.age) = (start, 0);
+        } else if self.held == Held::No && self.age + 1 >= t_mapc {
+            (self.sign, self.age) = (self.sign.next(), 0);
+        } else {
+            self.age = self.age.saturating_add(1).min(t_mapc - 1);
+        }
+    }
+    fn hold(&mut self, held: Held, out: &mut Outbox) {
+        if (self.held == Held::No) != (held == Held::No) {
+            out.observe(Observation::MasterLifeHeld { slave: self.slave, held: held != Held::No });
+        }
+        self.held = held;
+    }
+    fn check(&mut self, out: &mut Outbox) {
+        let from = self.monitor.state();
+        let step = self.monitor.cycle(self.received.value());
+        let to = self.monitor.state();
+        if from != to {
+            out.observe(Observation::SlaveLife { slave: self.slave, from, to, tripped: step.tripped });
+        }
+    }
+}
+
+impl Application for Controller {
+    type Command = Command;
+
+    fn cycle(&mut self, _cycle: u64, mode: MasterMode, out: &mut Outbox) {
+        for axis in &mut self.axes {
+            if axis.joined && mode == MasterMode::Operate {
+                axis.count(self.t_mapc, self.start, out);
+            } else {
+                axis.sign = LifeSign::INVALID;
+            }
+        }
+    }
+    fn outputs(&mut self, slave: usize, du: &mut [u8]) {
+        let axis = &self.axes[slave];
+        let g1_stw = axis.control.with(G1Stw::ACKNOWLEDGE, axis.control.acknowledge() || axis.acknowledge > 0);
+        let outputs = Outputs81 { stw2: Stw2(axis.sign.to_word()), g1_stw };
+        du.copy_from_slice(&outputs.emit());
+    }
+    fn inputs(&mut self, slave: usize, inputs: Option<&[u8]>, out: &mut Outbox) {
+        let axis = &mut self.axes[slave];
+        if let Some(inputs) = inputs.and_then(Inputs81::parse) {
+            axis.received = LifeSign::from_word(inputs.zsw2.0);
+        }
+        axis.check(out);
+    }
+    fn joined(&mut self, slave: usize, joined: bool, out: &mut Outbox) {
+        let axis = &mut self.axes[slave];
+        let from = axis.monitor.state();
+        axis.joined = joined;
+        axis.sign = LifeSign::INVALID;
+        axis.received = LifeSign::INVALID;
+        axis.monitor.reset();
+        if from != LifeState::Waiting {
+            let to = LifeState::Waiting;
+            out.observe(Observation::SlaveLife { slave: axis.slave, from, to, tripped: false });
+        }
+    }
+    fn command(&mut self, command: Command, out: &mut Outbox) {
+        let mut all = self.axes.iter_mut().enumerate();
+        let Some((slave, axis)) = all.find(|(_, axis)| axis.slave == command.slave()) else { return };
+        match command {
+            Command::Acknowledge(_) => axis.acknowledge = ACKNOWLEDGE_CYCLES + 1,
+            Command::ControlWord(_, bits) => axis.control = bits,
+            Command::HoldLife(_, cycles) => axis.hold(cycles.map_or(Held::ForGood, Held::For), out),
+            Command::ReleaseLife(_) => axis.hold(Held::No, out),
+            Command::JumpLife(_, to) => (axis.sign, axis.age) = (LifeSign::new(to), 0),
+            Command::ReadParameter(_, parameter) => {
+                self.parameters.ask((slave, axis.slave), parameter, None, out);
+            }
+            Command::ChangeParameter(_, parameter, format, value) => {
+                self.parameters.ask((slave, axis.slave), parameter, Some((format, value)), out);
+            }
+        }
+    }
+    fn acyclic(&mut self) -> Option<Job> {
+        self.parameters.job()
+    }
+    fn acyclic_done(&mut self, _slave: usize, answer: Result<&[u8], Failure>, out: &mut Outbox) {
+        self.parameters.answered(answer, out);
+    }
+}

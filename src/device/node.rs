@@ -1,0 +1,81 @@
+//! A node: any station of a network, so that a network needs no dynamic dispatch.
+
+use crate::device::controller::{Command as ControllerCommand, Controller};
+use crate::device::drive::Drive;
+use crate::device::encoder::Encoder;
+use crate::dp::handler::{Patch, StartupTelegram};
+use crate::dp::master::{Master, Order};
+use crate::fdl::{Filter, Input, Outbox, Station};
+use crate::observation::MasterMode;
+use crate::wire::Address;
+
+/// What a scenario may order a node to do.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Command {
+    /// Clear or Operate, to the master.
+    Mode(MasterMode),
+    /// A slave is started anew with a changed telegram.
+    Patch(Address, StartupTelegram, Patch),
+    /// Something for the master's application.
+    Application(ControllerCommand),
+}
+
+/// Any station.
+#[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant)] // A network holds one master and lives in one vector.
+pub enum Node {
+    /// A class 1 master with its application.
+    Master(Master<Controller>),
+    /// An absolute encoder.
+    Encoder(Encoder),
+    /// A slave with the subscriber function.
+    Drive(Drive),
+    /// A station that is on the cable and never says anything.
+    Silent(Address),
+}
+
+impl Station for Node {
+    type Command = Command;
+
+    fn address(&self) -> Address {
+        match self {
+            Self::Master(master) => master.address(),
+            Self::Encoder(encoder) => encoder.address(),
+            Self::Drive(drive) => drive.address(),
+            Self::Silent(address) => *address,
+        }
+    }
+    fn filter(&self) -> Filter {
+        match self {
+            Self::Master(master) => master.filter(),
+            Self::Encoder(encoder) => encoder.filter(),
+            Self::Drive(drive) => drive.filter(),
+            Self::Silent(address) => Filter::own(*address),
+        }
+    }
+    fn step(&mut self, now: crate::time::Local, input: Input<'_, Command>, out: &mut Outbox) {
+        match self {
+            Self::Master(master) => {
+                let input = input.map_command(|command| match command {
+                    Command::Mode(mode) => Some(Order::Mode(mode)),
+                    Command::Patch(slave, telegram, patch) => Some(Order::Patch(slave, telegram, patch)),
+                    Command::Application(command) => Some(Order::Application(command)),
+                });
+                if let Some(input) = input {
+                    master.step(now, input, out);
+                }
+            }
+            Self::Encoder(encoder) => {
+                if let Some(input) = input.map_command(|_| None) {
+                    encoder.step(now, input, out);
+                }
+            }
+            Self::Drive(drive) => {
+                if let Some(input) = input.map_command(|_| None) {
+                    drive.step(now, input, out);
+                }
+            }
+            Self::Silent(_) => {}
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! Device profiles: what a configuration tool knows about a device from its GSD file and its manual.
+
+use crate::fdl::params::BusParams;
+use crate::time::{BitRate, Span, Tbit};
+
+/// A kind of slave that a scenario can name.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Profile {
+    /// The name in scenario files.
+    pub name: &'static str,
+    /// What it is, in a sentence without its full stop.
+    pub title: &'static str,
+    /// Ident_Number, octets 5..=6 of Set_Prm.
+    pub ident: u16,
+    /// The data unit of Chk_Cfg (manual 2.1.1).
+    pub config: &'static [u8],
+    /// Octets from slave to master in a Data_Exchange.
+    pub inputs: u8,
+    /// Octets from master to slave in a Data_Exchange.
+    pub outputs: u8,
+    /// MaxTsdr, the longest T_SDR, in the order of [`BitRate::ALL`]; see [`Profile::max_tsdr`].
+    pub max_tsdr: [Tbit; BitRate::ALL.len()],
+    /// TDP_MIN, the shortest T_DP (manual 3.3.2).
+    pub t_dp_min: Span,
+    /// TDP_MAX, the longest T_DP (manual 3.3.2).
+    pub t_dp_max: Span,
+    /// T_BASE_DP, the step of T_DP (1/12 us) (manual 3.3.1).
+    pub t_base_dp: u32,
+    /// T_BASE_IO, the step of T_I and T_O (1/12 us) (manual 3.3.4).
+    pub t_base_io: u32,
+    /// TI_MIN, the shortest T_I while octet 15 bit 1 is 0 (manual 3.3.5).
+    pub t_i_min: Span,
+    /// TO_MIN, what T_O must exceed T_DX by (manual 3.3.6).
+    pub t_o_min: Span,
+    /// Shortest time from T_O to the latch while octet 15 bit 1 is 0 (manual 3.3.5, 3.3.6).
+    pub gap_min: Span,
+    /// Both minima, T_I and the gap, while octet 15 bit 1 is 1 (manual 3.2.2).
+    pub functions_min: Span,
+    /// T_PLL_W_MAX, the widest window a tool may set (1/12 us).
+    pub t_pll_w_max: u16,
+    /// The narrowest window; less is taken as this (manual 3.3.8).
+    pub min_window: Span,
+    /// Steps in a revolution of the disc.
+    pub steps_per_rev: u32,
+    /// Revolutions that are told apart.
+    pub revolutions: u32,
+    /// Whether other slaves can receive its inputs (manual 3.4).
+    pub publisher: bool,
+    /// Whether it can receive other slaves' inputs.
+    pub subscriber: bool,
+    /// Whether an empty Data_Exchange means Clear to it.
+    pub fail_safe: bool,
+    /// Where all this comes from.
+    pub source: &'static str,
+}
+
+impl Profile {
+    /// MaxTsdr, the longest T_SDR at `rate` (t_bit).
+    pub const fn max_tsdr(&self, rate: BitRate) -> Tbit {
+        self.max_tsdr[rate as usize]
+    }
+    /// Step of T_DP.
+    pub const fn dp_grid(&self) -> Span {
+        Span::from_iso_units(self.t_base_dp)
+    }
+    /// Step of T_I and T_O.
+    pub const fn io_grid(&self) -> Span {
+        Span::from_iso_units(self.t_base_io)
+    }
+    /// Shortest T_I with octet 15 bit 1 = `functions` (manual 3.2.2, 3.3.5).
+    pub const fn t_i_min(&self, functions: bool) -> Span {
+        if functions { self.functions_min } else { self.t_i_min }
+    }
+    /// Shortest time from T_O to the latch with octet 15 bit 1 = `functions` (manual 3.2.2, 3.3.5).
+    pub const fn gap_min(&self, functions: bool) -> Span {
+        if functions { self.functions_min } else { self.gap_min }
+    }
+}
+
+/// Telegram 81 (manual 2.1.1).
+const TELEGRAM_81: &[u8] = &[0xC3, 0xC1, 0xC5, 0xFD, 0x00, 0x51];
+
+/// What all devices here share: the isochronous limits of manual 3.3 and a disc of 13 + 12 bit.
+const ENCODER: Profile = Profile {
+    name: "",
+    title: "",
+    ident: 0,
+    config: TELEGRAM_81,
+    inputs: 12,
+    outputs: 4,
+    max_tsdr: profile_max_tsdr(),
+    t_dp_min: Span::from_us(500),
+    t_dp_max: Span::from_ms(32),
+    t_base_dp: 1_500,
+    t_base_io: 1_500,
+    t_i_min: Span::from_us(125),
+    t_o_min: Span::from_us(125),
+    gap_min: Span::from_us(125),
+    functions_min: Span::from_us(375),
+    t_pll_w_max: 240,
+    min_window: Span::from_us(1),
+    steps_per_rev: 8_192,
+    revolutions: 4_096,
+    publisher: true,
+    subscriber: false,
+    fail_safe: true,
+    source: "",
+};
+
+/// Every device, in the order in which lists show them.
+pub const PROFILES: &[Profile] = &[
+    Profile {
+        name: "posital-ocd-dpb1b",
+        title: "POSITAL OCD-DPB1B absolute encoder, 13 + 12 bit",
+        ident: 0x06DF,
+        source: "manual 2.1.1, 3.2, 3.3; MaxTsdr Model: D2, Ident Model: D24, T_PLL_W_MAX and Fail_Safe as SIEM80F9.GSE",
+        ..ENCODER
+    },
+    Profile {
+        name: "scancon-sag-dpb1b",
+        title: "SCANCON SAG-DPB1B absolute encoder, 13 + 12 bit",
+        ident: 0x06DF,
+        source: "manual 2.1.1, 3.2, 3.3; MaxTsdr Model: D2, Ident Model: D24, T_PLL_W_MAX and Fail_Safe as SIEM80F9.GSE",
+        ..ENCODER
+    },
+    Profile {
+        name: "simodrive-sensor-isochron",
+        title: "SIMODRIVE sensor isochron absolute encoder, 13 + 12 bit",
+        ident: 0x80F9,
+        max_tsdr: fast_max_tsdr(),
+        source: "SIEM80F9.GSE; times with octet 15 bit 1 and the narrowest window as the encoder manual, 3.2.2, 3.3.8",
+        ..ENCODER
+    },
+    Profile {
+        name: "subscriber-drive",
+        title: "generic DP-V2 slave that follows a publisher",
+        // A manufacturer's telegram of telegram 81's lengths, so that one Data_Exchange costs the same.
+        ident: 0xF0D0,
+        config: &[0xC3, 0xC1, 0xC5, 0xFD, 0x00, 0x00],
+        publisher: false,
+        subscriber: true,
+        source: "Model: D24",
+        ..ENCODER
+    },
+];
+
+/// The device called `name`, if there is one.
+pub fn find(name: &str) -> Option<&'static Profile> {
+    PROFILES.iter().find(|profile| profile.name == name)
+}
+
+/// The DP profile's max T_SDR at each rate (Model: D2).
+const fn profile_max_tsdr() -> [Tbit; BitRate::ALL.len()] {
+    let mut all = [Tbit(0); BitRate::ALL.len()];
+    let mut i = 0;
+    while i < all.len() {
+        all[i] = BusParams::profile(BitRate::ALL[i]).max_tsdr;
+        i += 1;
+    }
+    all
+}
+
+/// MaxTsdr of a fast ASIC: 15 t_bit up to 500 kbit/s, then 25, 50, 100, 200 (SIEM80F9.GSE).
+const fn fast_max_tsdr() -> [Tbit; BitRate::ALL.len()] {
+    let mut all = [Tbit(15); BitRate::ALL.len()];
+    all[BitRate::M1_5 as usize] = Tbit(25);
+    all[BitRate::M3 as usize] = Tbit(50);
+    all[BitRate::M6 as usize] = Tbit(100);
+    all[BitRate::M12 as usize] = Tbit(200);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_profile_is_found_by_its_name_and_complete() {
+        for profile in PROFILES {
+            assert_eq!(find(profile.name), Some(profile));
+            assert!(!profile.title.is_empty() && !profile.source.is_empty() && profile.ident != 0, "{}", profile.name);
+            assert!(profile.t_dp_min.is_multiple_of(profile.dp_grid()), "{}", profile.name);
+            assert!(profile.publisher != profile.subscriber, "{}", profile.name);
+        }
+        assert_eq!(find("posital"), None);
+    }
+
+    #[test]
+    fn names_are_unique() {
+        for (i, a) in PROFILES.iter().enumerate() {
+            assert!(PROFILES[..i].iter().all(|b| b.name != a.name), "{}", a.name);
+        }
+    }
+
+    #[test]
+    fn max_tsdr_is_read_by_rate() {
+        let at = |name: &str, rate| find(name).unwrap().max_tsdr(rate).0;
+        let rates = [BitRate::K500, BitRate::M1_5, BitRate::M3, BitRate::M6, BitRate::M12];
+        assert_eq!(rates.map(|rate| at("posital-ocd-dpb1b", rate)), [100, 150, 250, 450, 800]);
+        assert_eq!(rates.map(|rate| at("simodrive-sensor-isochron", rate)), [15, 25, 50, 100, 200]);
+        for (index, &rate) in BitRate::ALL.iter().enumerate() {
+            assert_eq!(rate as usize, index);
+        }
+    }
+}

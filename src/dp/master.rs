@@ -1,0 +1,488 @@
+//! The class 1 master: operation modes, the isochronous cycle, one handler per slave.
+//!
+//! One cycle (Model: D6), `t0` being the last bit of SYNCH:
+//!
+//! ```text
+//! SYNCH | Data_Exchange in address order | one acyclic message | GAP, every G-th cycle | token | silence | SYNCH
+//!       t0                               T_DX
+//! ```
+//!
+//! | part | ends with | next part |
+//! |---|---|---|
+//! | Starting | token claimed | Spare, first SYNCH one T_DP later |
+//! | Spare | `Schedule` due | Clock: SYNCH on its way |
+//! | Clock | its last bit has left | Exchange with the first slave |
+//! | Exchange | answer or none after the repeats | Exchange with the next slave; after the last Control, Startup or Acyclic |
+//! | Control, Startup, Acyclic | end of the Global_Control, answer or none | Gap |
+//! | Gap | answer or none | Spare, the token sent |
+//!
+//! A part that has nothing to do, or whose longest course would not end before the next SYNCH, is left out.
+
+use alloc::vec::Vec;
+
+use crate::dp::GLOBAL_CONTROL;
+use crate::dp::handler::{Answer, Handler, Patch, SlaveParams, StartupTelegram};
+use crate::dp::iso::{CycleClock, Rearm};
+use crate::dp::ms1::{Client, Failure, Job, MS1, Progress};
+use crate::fdl::active::{Active, Confirm, Request};
+use crate::fdl::params::BusParams;
+use crate::fdl::{Filter, Input, Outbox, Station, Timer};
+use crate::observation::{MasterMode, Observation};
+use crate::time::{Local, Span};
+use crate::wire::control::GlobalControl;
+use crate::wire::{Address, Service, Status};
+
+/// C1_Response_Timeout (SIEM80F9.GSE).
+const C1_RESPONSE_TIMEOUT: Span = Span::from_s(10);
+/// Characters of a Global_Control telegram.
+const GC_OCTETS: usize = 13;
+/// Characters of a telegram around its data unit, with and without SAPs.
+const SAP_FRAME_OCTETS: usize = 11;
+/// Characters of an FDL status request and its answer.
+const STATUS_OCTETS: usize = 6;
+
+/// The program behind the master: it makes outputs and takes inputs. Slaves are named by their index in the list
+/// the master was made with.
+pub trait Application {
+    /// What the scenario may order it to do.
+    type Command: Copy;
+
+    /// A cycle begins.
+    fn cycle(&mut self, cycle: u64, mode: MasterMode, out: &mut Outbox);
+    /// Writes the outputs for a slave. Not called in Clear.
+    fn outputs(&mut self, slave: usize, du: &mut [u8]);
+    /// A slave's inputs of this cycle, or none where nothing valid came.
+    fn inputs(&mut self, slave: usize, inputs: Option<&[u8]>, out: &mut Outbox);
+    /// A slave joined data exchange, or left it.
+    fn joined(&mut self, slave: usize, joined: bool, out: &mut Outbox);
+    /// The next acyclic job, if there is one. Asked whenever the one before is over.
+    fn acyclic(&mut self) -> Option<Job>;
+    /// An acyclic job is over: the slave's answer, or why there is none.
+    fn acyclic_done(&mut self, slave: usize, answer: Result<&[u8], Failure>, out: &mut Outbox);
+    /// The scenario orders something.
+    fn command(&mut self, command: Self::Command, out: &mut Outbox);
+}
+
+/// An order of the scenario to a master.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Order<C> {
+    /// Another operation mode: Clear or Operate.
+    Mode(MasterMode),
+    /// A slave is started anew, with this telegram changed.
+    Patch(Address, StartupTelegram, Patch),
+    /// Something for its application.
+    Application(C),
+}
+
+/// What a master is told before it starts.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Station address.
+    pub address: Address,
+    /// Bus parameters.
+    pub bus: BusParams,
+    /// T_DP.
+    pub t_dp: Span,
+    /// How the next cycle start is found.
+    pub rearm: Rearm,
+    /// Repeats of an unanswered Data_Exchange (Model: D7).
+    pub dx_retries: u8,
+    /// Cycles in a row without answer after which a slave is given up. Model: none of the sources has a number.
+    pub lost_after: u16,
+    /// Cycles in Clear before Operate.
+    pub clear_for: u64,
+    /// Data_Control_Time; the mode is told to the slaves at least every third of it (Model: D5).
+    pub data_control_time: Span,
+    /// The slaves, in the order in which they are polled.
+    pub slaves: Vec<SlaveParams>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Part {
+    Starting,
+    Spare,
+    Clock,
+    /// Data_Exchange with the slave of this index.
+    Exchange(usize),
+    /// The start-up service of the slave of this index.
+    Startup(usize),
+    /// A request or poll of the acyclic job.
+    Acyclic,
+    /// Global_Control is on its way.
+    Control,
+    Gap(Address),
+}
+
+/// A class 1 master.
+#[derive(Clone, Debug)]
+pub struct Master<A> {
+    settings: Settings,
+    active: Active,
+    clock: CycleClock,
+    mode: MasterMode,
+    handlers: Vec<Handler>,
+    part: Part,
+    app: A,
+    /// Start of the running cycle.
+    t0: Local,
+    /// Last bit of the last Data_Exchange answer, or t0.
+    exchange_end: Local,
+    exchanged: bool,
+    retries: u32,
+    /// The mode has to be told to the slaves.
+    control_due: bool,
+    /// Cycle in which it was told last, and after how many it is told again.
+    control_told: u64,
+    control_every: u64,
+    /// Where the search for the next slave in start-up begins.
+    startup_next: usize,
+    ms1: Client,
+}
+
+impl<A: Application> Master<A> {
+    /// A master without supply.
+    pub fn new(settings: Settings, app: A) -> Self {
+        let t_gc = settings.bus.rate.octets(GC_OCTETS);
+        let third = Span::from_ticks(settings.data_control_time.ticks() / 3);
+        Self {
+            active: Active::new(settings.address, settings.bus),
+            clock: CycleClock::new(settings.t_dp, t_gc, settings.rearm, Local::ZERO),
+            mode: MasterMode::Offline,
+            handlers: settings.slaves.iter().cloned().map(Handler::new).collect(),
+            part: Part::Starting,
+            app,
+            t0: Local::ZERO,
+            exchange_end: Local::ZERO,
+            exchanged: false,
+            retries: 0,
+            control_due: true,
+            control_told: 0,
+            control_every: third.div_floor(settings.t_dp).max(1) as u64,
+            startup_next: 0,
+            ms1: Client::new(C1_RESPONSE_TIMEOUT),
+            settings,
+        }
+    }
+    /// Operation mode now.
+    pub const fn mode(&self) -> MasterMode {
+        self.mode
+    }
+    /// What the master knows of its slaves.
+    pub fn handlers(&self) -> &[Handler] {
+        &self.handlers
+    }
+    /// The application.
+    pub const fn application(&self) -> &A {
+        &self.app
+    }
+
+    fn set_mode(&mut self, to: MasterMode, out: &mut Outbox) {
+        let from = core::mem::replace(&mut self.mode, to);
+        if from != to {
+            out.observe(Observation::MasterMode { from, to });
+            self.control_due = true;
+        }
+    }
+
+    fn power_on(&mut self, now: Local, out: &mut Outbox) {
+        for handler in &mut self.handlers {
+            handler.restart(out);
+        }
+        self.active = Active::new(self.settings.address, self.settings.bus);
+        self.part = Part::Starting;
+        self.set_mode(MasterMode::Offline, out);
+        self.active.power_on(now, out);
+    }
+
+    fn confirmed(&mut self, now: Local, confirm: Confirm<'_>, out: &mut Outbox) {
+        match (self.part, confirm) {
+            (_, Confirm::Nothing) => {}
+            (Part::Starting, Confirm::TokenHeld) => self.begin(now, out),
+            (Part::Exchange(slave), confirm) => {
+                self.exchange_answered(now, slave, confirm, out);
+                self.exchange(now, slave + 1, out);
+            }
+            (Part::Startup(slave), confirm) => {
+                self.startup_answered(slave, confirm, out);
+                self.gap(out);
+            }
+            (Part::Acyclic, confirm) => {
+                self.acyclic_answered(now, confirm, out);
+                self.gap(out);
+            }
+            (Part::Gap(address), Confirm::Gap(answer)) => {
+                out.observe(Observation::Gap { address, answer });
+                self.token(out);
+            }
+            (part, confirm) => unreachable!("{confirm:?} during {part:?}: the active station answers requests only"),
+        }
+    }
+
+    /// The token is held: the slaves are started up in Clear, the clock starts one T_DP from here.
+    fn begin(&mut self, now: Local, out: &mut Outbox) {
+        let t_gc = self.settings.bus.rate.octets(GC_OCTETS);
+        self.clock = CycleClock::new(self.settings.t_dp, t_gc, self.settings.rearm, now + self.settings.t_dp);
+        self.set_mode(MasterMode::Clear, out);
+        self.spare(now, out);
+    }
+
+    fn spare(&mut self, from: Local, out: &mut Outbox) {
+        self.part = Part::Spare;
+        out.arm(Timer::Schedule, from);
+    }
+
+    /// `Schedule` came due.
+    fn scheduled(&mut self, now: Local, out: &mut Outbox) {
+        match self.part {
+            Part::Spare => self.synch(now, out),
+            Part::Control => self.gap(out),
+            _ => {}
+        }
+    }
+
+    fn synch(&mut self, now: Local, out: &mut Outbox) {
+        let planned = self.clock.planned();
+        let at = planned.max(self.active.free_at()).max(now);
+        if at > planned {
+            out.observe(Observation::ClockLate { by: at - planned });
+        }
+        // SYNCH says the same in Clear and Operate (Model: D5).
+        self.active.send_clock(at, GLOBAL_CONTROL, &GlobalControl::SYNCH.emit(), out);
+        self.part = Part::Clock;
+    }
+
+    /// The last bit of SYNCH left at `now`: a cycle begins.
+    fn clock_sent(&mut self, now: Local, out: &mut Outbox) {
+        self.active.clock_sent(now);
+        let (cycle, nominal) = self.clock.started(now);
+        self.t0 = now;
+        self.exchange_end = now;
+        self.exchanged = false;
+        self.retries = 0;
+        out.observe(Observation::CycleStart { cycle, nominal });
+        if self.mode == MasterMode::Clear && cycle == self.settings.clear_for {
+            self.set_mode(MasterMode::Operate, out);
+        }
+        self.app.cycle(cycle, self.mode, out);
+        self.exchange(now, 0, out);
+    }
+
+    /// Data_Exchange with the first slave from index `from` on that takes part.
+    fn exchange(&mut self, now: Local, from: usize, out: &mut Outbox) {
+        let Some(slave) = (from..self.handlers.len()).find(|&slave| self.handlers[slave].exchanges()) else {
+            return self.exchange_done(out);
+        };
+        self.exchanged = true;
+        self.part = Part::Exchange(slave);
+        let handler = &self.handlers[slave];
+        let request = handler.exchange(self.settings.dx_retries);
+        let params = handler.params();
+        let at = self.active.free_at().max(now);
+        let app = &mut self.app;
+        match self.mode {
+            MasterMode::Operate => {
+                self.active.request(at, &request, params.outputs.into(), out, |du| app.outputs(slave, du));
+            }
+            _ if params.fail_safe => self.active.request(at, &request, 0, out, |_| ()),
+            _ => self.active.request(at, &request, params.outputs.into(), out, |_| ()),
+        }
+    }
+    fn exchange_answered(&mut self, now: Local, slave: usize, confirm: Confirm<'_>, out: &mut Outbox) {
+        self.exchange_end = now;
+        let handler = &mut self.handlers[slave];
+        let expected = usize::from(handler.params().inputs);
+        let lost = match confirm {
+            Confirm::Reply { status: Status::Dl | Status::Dh, du } if du.len() == expected => {
+                handler.exchanged();
+                self.app.inputs(slave, Some(du), out);
+                return;
+            }
+            Confirm::Acknowledged if expected == 0 => return handler.exchanged(),
+            Confirm::NoReply => handler.missed(self.settings.lost_after, out),
+            Confirm::Reply { status: Status::Rs, .. } => handler.refused(out),
+            _ => {
+                out.observe(Observation::IllegalAnswer { slave: handler.params().address });
+                handler.refused(out)
+            }
+        };
+        self.app.inputs(slave, None, out);
+        if lost {
+            self.left(slave, out);
+        }
+    }
+    fn exchange_done(&mut self, out: &mut Outbox) {
+        if self.exchanged {
+            out.observe(Observation::ExchangeDone { t_dx: self.exchange_end - self.t0, retries: self.retries });
+        }
+        self.acyclic(self.exchange_end, out);
+    }
+
+    /// Whether something that keeps the bus busy for `span` ends early enough for the next SYNCH.
+    fn fits(&self, span: Span) -> bool {
+        self.active.free_at() + span + self.active.t_id1() <= self.clock.planned()
+    }
+
+    /// The one acyclic message of this cycle: the mode if it is due, else a slave's start-up and the acyclic job in
+    /// turn (Model: D6).
+    fn acyclic(&mut self, now: Local, out: &mut Outbox) {
+        let since = self.clock.coming().saturating_sub(self.control_told);
+        let control = self.control_due || since >= self.control_every;
+        let rate = self.settings.bus.rate;
+        if control && self.fits(rate.octets(GC_OCTETS) + self.settings.bus.span(self.settings.bus.t_id2())) {
+            return self.tell_mode(out);
+        }
+        let count = self.handlers.len();
+        let mut slaves = (0..count).map(|i| (self.startup_next + i) % count);
+        let starting = slaves.find(|&slave| !self.handlers[slave].exchanges());
+        if self.ms1.is_idle()
+            && let Some(job) = self.app.acyclic()
+        {
+            self.ms1.begin(now, job);
+        }
+        match starting {
+            Some(slave) if self.ms1.is_idle() || self.clock.coming().is_multiple_of(2) => self.startup(slave, out),
+            _ if !self.ms1.is_idle() => self.acyclic_message(out),
+            _ => self.gap(out),
+        }
+    }
+    fn acyclic_message(&mut self, out: &mut Outbox) {
+        let Some((slave, du)) = self.ms1.next() else { return self.gap(out) };
+        let longest = SAP_FRAME_OCTETS + self.ms1.longest_answer();
+        let Some(retries) = self.retries_that_fit(SAP_FRAME_OCTETS + du.len(), longest) else {
+            return self.gap(out);
+        };
+        let to = self.handlers[slave].params().address;
+        let request = Request { to, service: Service::SrdLow, saps: Some(MS1), retries };
+        self.active.request(self.active.free_at(), &request, du.len(), out, |to| to.copy_from_slice(du));
+        self.part = Part::Acyclic;
+    }
+    fn acyclic_answered(&mut self, now: Local, confirm: Confirm<'_>, out: &mut Outbox) {
+        let answer = match confirm {
+            Confirm::Acknowledged => Ok(None),
+            Confirm::Reply { status: Status::Dl | Status::Dh, du } => Ok(Some(du)),
+            Confirm::Reply { status, .. } => Err(Some(status)),
+            _ => Err(None),
+        };
+        match self.ms1.answered(now, answer) {
+            Progress::Going => {}
+            Progress::Done { slave, pdu } => self.app.acyclic_done(slave, Ok(pdu), out),
+            Progress::Failed { slave, why } => self.app.acyclic_done(slave, Err(why), out),
+        }
+    }
+    /// How often a request of `octets` characters with an answer of up to `reply` may be repeated before the next
+    /// SYNCH; none if it does not fit once.
+    fn retries_that_fit(&self, octets: usize, reply: usize) -> Option<u8> {
+        let once = self.active.longest_cycle(octets, reply);
+        let limit = self.settings.bus.max_retry_limit;
+        let all = (once + self.active.t_id1()) * (i64::from(limit) + 1);
+        self.fits(once).then_some(if self.fits(all) { limit } else { 0 })
+    }
+    fn tell_mode(&mut self, out: &mut Outbox) {
+        let control = if self.mode == MasterMode::Operate { GlobalControl::OPERATE } else { GlobalControl::CLEAR };
+        self.control_due = false;
+        self.control_told = self.clock.coming();
+        let end =
+            self.active.broadcast(self.active.free_at(), Address::BROADCAST, GLOBAL_CONTROL, &control.emit(), out);
+        self.part = Part::Control;
+        out.arm(Timer::Schedule, end);
+    }
+    fn startup(&mut self, slave: usize, out: &mut Outbox) {
+        let handler = &self.handlers[slave];
+        let (saps, du, reply) = handler.service();
+        let Some(retries) = self.retries_that_fit(SAP_FRAME_OCTETS + du.len(), SAP_FRAME_OCTETS + reply) else {
+            return self.gap(out);
+        };
+        let request = Request { to: handler.params().address, service: Service::SrdHigh, saps: Some(saps), retries };
+        self.active.request(self.active.free_at(), &request, du.len(), out, |to| to.copy_from_slice(du));
+        self.part = Part::Startup(slave);
+        self.startup_next = slave + 1;
+    }
+    fn startup_answered(&mut self, slave: usize, confirm: Confirm<'_>, out: &mut Outbox) {
+        let answer = match confirm {
+            Confirm::Reply { status: Status::Dl | Status::Dh, du } => Answer::Data(du),
+            Confirm::Reply { status, .. } => Answer::Refused(status),
+            Confirm::Acknowledged => Answer::Acknowledged,
+            _ => Answer::Nothing,
+        };
+        if self.handlers[slave].answered(answer, out) {
+            self.app.joined(slave, true, out);
+            // The newcomer has not heard the mode yet.
+            self.control_due = true;
+        }
+    }
+
+    fn patch(&mut self, slave: Address, telegram: StartupTelegram, patch: &Patch, out: &mut Outbox) {
+        let found = self.handlers.iter().position(|handler| handler.params().address == slave);
+        let Some(slave) = found else { return };
+        let joined = self.handlers[slave].exchanges();
+        self.handlers[slave].patch(telegram, patch, out);
+        if joined {
+            self.left(slave, out);
+        }
+    }
+    /// A slave is not in data exchange any more.
+    fn left(&mut self, slave: usize, out: &mut Outbox) {
+        self.app.joined(slave, false, out);
+        if self.ms1.left(slave) {
+            self.app.acyclic_done(slave, Err(Failure::Left), out);
+        }
+    }
+
+    fn gap(&mut self, out: &mut Outbox) {
+        let due = self.clock.coming().is_multiple_of(self.settings.bus.gap_factor.into());
+        if due && self.fits(self.active.longest_cycle(STATUS_OCTETS, STATUS_OCTETS)) {
+            let address = self.active.poll_gap(self.active.free_at(), out);
+            self.part = Part::Gap(address);
+        } else {
+            self.token(out);
+        }
+    }
+    fn token(&mut self, out: &mut Outbox) {
+        let free = self.active.free_at();
+        let end = if self.fits(self.settings.bus.rate.octets(3)) { self.active.pass_token(free, out) } else { free };
+        out.observe(Observation::CycleSpare {
+            acyclic: end - self.exchange_end,
+            spare: (self.clock.planned() - end).max(Span::ZERO),
+        });
+        self.spare(end, out);
+    }
+}
+
+impl<A: Application> Station for Master<A> {
+    type Command = Order<A::Command>;
+
+    fn address(&self) -> Address {
+        self.settings.address
+    }
+    fn filter(&self) -> Filter {
+        Filter::all(self.settings.address)
+    }
+    fn step(&mut self, now: Local, input: Input<'_, Self::Command>, out: &mut Outbox) {
+        match input {
+            Input::PowerOn => self.power_on(now, out),
+            Input::Telegram(heard) => {
+                let confirm = self.active.heard(now, heard, out);
+                self.count_retry(out);
+                self.confirmed(now, confirm, out);
+            }
+            Input::Sent => self.clock_sent(now, out),
+            Input::Deadline { timer: Timer::Slot, busy } => {
+                let confirm = self.active.slot_over(now, busy, out);
+                self.count_retry(out);
+                self.confirmed(now, confirm, out);
+            }
+            Input::Deadline { timer: Timer::Schedule, .. } => self.scheduled(now, out),
+            Input::Command(Order::Mode(mode)) if self.mode >= MasterMode::Clear => self.set_mode(mode, out),
+            Input::Deadline { .. } | Input::Sample(_) | Input::Command(Order::Mode(_)) => {}
+            Input::Command(Order::Patch(slave, telegram, patch)) => self.patch(slave, telegram, &patch, out),
+            Input::Command(Order::Application(command)) => self.app.command(command, out),
+        }
+    }
+}
+
+impl<A: Application> Master<A> {
+    /// The active station repeats on its own and says so in this step's observations.
+    fn count_retry(&mut self, out: &Outbox) {
+        self.retries += u32::from(out.observations().any(|seen| matches!(seen, Observation::Retry { .. })));
+    }
+}

@@ -1,0 +1,400 @@
+//! The DP slave: parameterisation, configuration, data exchange, diagnosis, watchdog.
+//!
+//! | state | input | next state | answer |
+//! |---|---|---|---|
+//! | POWER_ON | supply on, initialised | WAIT_PRM | - |
+//! | WAIT_PRM | good Set_Prm with Lock | WAIT_CFG | SC |
+//! | WAIT_PRM | bad Set_Prm | WAIT_PRM, Prm_Fault | SC |
+//! | WAIT_PRM | Chk_Cfg, Data_Exchange, RD_Inp, RD_Outp | WAIT_PRM | RS |
+//! | WAIT_CFG | good Chk_Cfg | DATA_EXCH | SC |
+//! | WAIT_CFG | bad Chk_Cfg | WAIT_PRM, Cfg_Fault | SC |
+//! | WAIT_CFG | Data_Exchange, RD_Inp, RD_Outp | WAIT_CFG | RS |
+//! | WAIT_CFG, DATA_EXCH | good Set_Prm with Lock | WAIT_CFG | SC |
+//! | WAIT_CFG, DATA_EXCH | bad Set_Prm, Unlock, watchdog | WAIT_PRM | SC, SC, - |
+//! | DATA_EXCH | good Chk_Cfg | DATA_EXCH | SC |
+//! | DATA_EXCH | bad Chk_Cfg | WAIT_PRM, Cfg_Fault | SC |
+//! | DATA_EXCH | Data_Exchange, RD_Inp, RD_Outp | DATA_EXCH | data |
+//! | DATA_EXCH | Data_Exchange of another length | WAIT_PRM | RS |
+//! | DATA_EXCH | MS1 with DPV1_Enable | DATA_EXCH | see [`ms1`](crate::dp::ms1) |
+//! | any but POWER_ON | Slave_Diag, Get_Cfg | unchanged | data |
+//! | any | Set_Prm with neither Lock nor Unlock | unchanged, min T_SDR in force | SC |
+//! | WAIT_CFG, DATA_EXCH | Set_Prm, Chk_Cfg, Data_Exchange of another master | unchanged | RS |
+//!
+//! Source: EN 50170-2. The slave belongs to one device, whose own rules come in through [`Application`].
+
+use core::fmt;
+
+use crate::dp::ms1::{Answer, Records, Server};
+use crate::fdl::passive::{Indication, Passive};
+use crate::fdl::{Filter, Heard, Outbox, Timer};
+use crate::observation::{Observation, SlaveCause, SlaveState};
+use crate::time::{BitRate, Local, Span, Tbit};
+use crate::wire::control::GlobalControl;
+use crate::wire::diag::{DiagStatus, Diagnosis};
+use crate::wire::prm::{PrmError, SetPrm};
+use crate::wire::{Address, Header, Sap, Status};
+
+/// Time from an acyclic request to its answer. Model: none of the sources has a number.
+const ACYCLIC_TIME: Span = Span::from_ms(2);
+/// Most output octets of a slave.
+const MAX_OUTPUTS: usize = 244;
+
+/// Why a slave does not take its parameters.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Refusal {
+    /// The telegram itself is wrong.
+    Telegram(PrmError),
+    /// The device cannot do what is asked for.
+    Device {
+        /// Octet of Set_Prm, from 1.
+        octet: usize,
+        /// The rule, as the second half of a sentence.
+        rule: &'static str,
+        /// The value found.
+        value: u64,
+    },
+}
+
+impl From<PrmError> for Refusal {
+    fn from(error: PrmError) -> Self {
+        Self::Telegram(error)
+    }
+}
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Telegram(error) => error.fmt(f),
+            Self::Device { octet, rule, value } => write!(f, "octet {octet} is {value}, but {rule}"),
+        }
+    }
+}
+impl core::error::Error for Refusal {}
+
+/// What a device brings along as a DP slave.
+pub trait Application: Records {
+    /// Checks the device's own rules for Set_Prm (blocks, times). Keeps nothing yet.
+    ///
+    /// # Errors
+    /// The rule that is broken; the slave then reports Prm_Fault.
+    fn check(&self, prm: &SetPrm<'_>) -> Result<(), Refusal>;
+    /// Takes parameters over that were found good.
+    fn parameterise(&mut self, prm: &SetPrm<'_>);
+    /// Data exchange begins.
+    fn enter(&mut self, now: Local, out: &mut Outbox);
+    /// Data exchange is over: watchdog, new parameters, unlock, fault.
+    fn leave(&mut self, now: Local, out: &mut Outbox);
+    /// New outputs, or none while the master is in Clear. `sample` is the raw position at the request.
+    fn outputs(&mut self, now: Local, outputs: Option<&[u8]>, sample: u32, out: &mut Outbox);
+    /// Writes the inputs of the reply.
+    fn inputs(&self, du: &mut [u8]);
+    /// The clock telegram SYNCH arrived during data exchange.
+    fn synch(&mut self, now: Local, out: &mut Outbox);
+    /// A Global_Control said Operate (`true`) or Clear during data exchange.
+    fn operate(&mut self, now: Local, operate: bool, out: &mut Outbox);
+    /// A publisher's reply was heard.
+    fn published(&mut self, now: Local, publisher: Address, du: &[u8], out: &mut Outbox);
+    /// Publishers to listen to: bit n is address n.
+    fn publishers(&self) -> u128;
+}
+
+/// What a slave is, for good.
+#[derive(Clone, Copy, Debug)]
+pub struct Identity {
+    /// Station address.
+    pub address: Address,
+    /// Ident_Number.
+    pub ident: u16,
+    /// The one configuration it accepts, as in Chk_Cfg.
+    pub config: &'static [u8],
+    /// Output octets (from the master).
+    pub outputs: u8,
+    /// Input octets (to the master).
+    pub inputs: u8,
+    /// Takes an empty Data_Exchange for Clear (DPV1_Status_1 bit 6 allowed).
+    pub fail_safe: bool,
+    /// Answers MSRD to everybody if so parameterised.
+    pub publisher: bool,
+    /// Bit rate of the bus.
+    pub rate: BitRate,
+    /// Own T_SDR.
+    pub t_sdr: Tbit,
+}
+
+/// A request to execute.
+struct Arrived<'a> {
+    now: Local,
+    header: Header,
+    du: &'a [u8],
+    sample: u32,
+}
+
+/// A DP slave without its device.
+#[derive(Clone, Debug)]
+pub struct Slave {
+    identity: Identity,
+    passive: Passive,
+    state: SlaveState,
+    /// The master whose parameters are in force.
+    master: Option<Address>,
+    /// Prm_Fault, Cfg_Fault, Not_Supported of the last attempt.
+    fault: DiagStatus,
+    watchdog: Option<Span>,
+    group: u8,
+    fail_safe: bool,
+    /// DPV1_Enable: MS1 is open.
+    dpv1: bool,
+    ms1: Server,
+    outputs: [u8; MAX_OUTPUTS],
+}
+
+impl Slave {
+    /// A slave without supply.
+    pub fn new(identity: Identity) -> Self {
+        Self {
+            passive: Passive::new(identity.address, identity.rate, identity.t_sdr),
+            identity,
+            state: SlaveState::PowerOn,
+            master: None,
+            fault: DiagStatus::default(),
+            watchdog: None,
+            group: 0,
+            fail_safe: false,
+            dpv1: false,
+            ms1: Server::new(ACYCLIC_TIME),
+            outputs: [0; MAX_OUTPUTS],
+        }
+    }
+    /// What it is.
+    pub const fn identity(&self) -> &Identity {
+        &self.identity
+    }
+    /// State now.
+    pub const fn state(&self) -> SlaveState {
+        self.state
+    }
+    /// Whether the last parameters or configuration were refused.
+    pub fn has_fault(&self) -> bool {
+        self.fault != DiagStatus::default()
+    }
+    /// Which telegrams it wants.
+    pub fn filter(&self, app: &impl Application) -> Filter {
+        Filter { all: false, own: self.identity.address, publishers: app.publishers() }
+    }
+
+    /// The supply came on: everything from before is forgotten, initialisation takes no time.
+    pub fn power_on(&mut self, now: Local, app: &mut impl Application, out: &mut Outbox) {
+        *self = Self::new(self.identity);
+        self.enter(SlaveState::WaitPrm, SlaveCause::Initialised, now, app, out);
+    }
+    /// [`Timer::Watchdog`] came due.
+    pub fn watchdog(&mut self, now: Local, app: &mut impl Application, out: &mut Outbox) {
+        if self.state != SlaveState::WaitPrm {
+            self.unlock(SlaveCause::Watchdog, now, app, out);
+        }
+    }
+
+    /// Takes a telegram whose last bit arrived at `now`.
+    pub fn heard(&mut self, now: Local, heard: Heard<'_>, app: &mut impl Application, out: &mut Outbox) {
+        match self.passive.heard(now, heard, out) {
+            Indication::Nothing => {}
+            Indication::Request { header, du } => {
+                if self.master == Some(header.sa) {
+                    self.retrigger(now, out);
+                }
+                let request = Arrived { now, header, du, sample: heard.sample };
+                self.request(&request, app, out);
+            }
+            Indication::Broadcast { header, du } => self.broadcast(now, &header, du, app, out),
+            Indication::Published { publisher, du } => app.published(now, publisher, du, out),
+        }
+    }
+    fn retrigger(&self, now: Local, out: &mut Outbox) {
+        if let Some(time) = self.watchdog {
+            out.arm(Timer::Watchdog, now + time);
+        }
+    }
+
+    fn request(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
+        let &Arrived { now, header, du, .. } = request;
+        match (header.dsap, header.ssap) {
+            (None, None) => self.data_exchange(request, app, out),
+            (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, out),
+            (Some(Sap::GET_CFG), Some(Sap::MASTER_MS0)) => {
+                let config = self.identity.config;
+                self.passive.reply(now, Status::Dl, config.len(), out, |du| du.copy_from_slice(config));
+            }
+            (Some(Sap::SET_PRM), Some(Sap::MASTER_MS0)) => self.set_prm(now, header.sa, du, app, out),
+            (Some(Sap::CHK_CFG), Some(Sap::MASTER_MS0)) => self.chk_cfg(now, header.sa, du, app, out),
+            (Some(Sap::RD_INP), Some(Sap::MASTER_MS0)) if self.state == SlaveState::DataExch => {
+                self.passive.reply(now, Status::Dl, self.identity.inputs.into(), out, |du| app.inputs(du));
+            }
+            (Some(Sap::RD_OUTP), Some(Sap::MASTER_MS0)) if self.state == SlaveState::DataExch => {
+                let outputs = &self.outputs[..self.identity.outputs.into()];
+                self.passive.reply(now, Status::Dl, outputs.len(), out, |du| du.copy_from_slice(outputs));
+            }
+            (Some(Sap::MS1), Some(Sap::MASTER_MS1)) => self.ms1(request, app, out),
+            _ => self.refuse(now, out),
+        }
+    }
+    fn ms1(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
+        let &Arrived { now, header, du, .. } = request;
+        if self.state != SlaveState::DataExch || !self.dpv1 || self.is_foreign(header.sa) {
+            return self.refuse(now, out);
+        }
+        match self.ms1.heard(now, du, app) {
+            Answer::Acknowledge => self.passive.acknowledge(now, out),
+            Answer::Data(pdu) => self.passive.reply(now, Status::Dl, pdu.len(), out, |du| du.copy_from_slice(pdu)),
+            Answer::Refuse(status) => self.passive.reply(now, status, 0, out, |_| ()),
+        }
+    }
+    fn refuse(&mut self, now: Local, out: &mut Outbox) {
+        self.passive.reply(now, Status::Rs, 0, out, |_| ());
+    }
+    /// Whether another master than `sa` has this slave.
+    fn is_foreign(&self, sa: Address) -> bool {
+        self.state != SlaveState::WaitPrm && self.master.is_some_and(|master| master != sa)
+    }
+
+    fn data_exchange(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
+        let &Arrived { now, header, du, sample } = request;
+        if self.state != SlaveState::DataExch || self.is_foreign(header.sa) {
+            return self.refuse(now, out);
+        }
+        let expected = usize::from(self.identity.outputs);
+        match du.len() {
+            // A fail-safe slave takes an empty request for Clear.
+            0 if self.fail_safe && expected > 0 => {
+                self.outputs = [0; MAX_OUTPUTS];
+                app.outputs(now, None, sample, out);
+            }
+            len if len == expected => {
+                self.outputs[..len].copy_from_slice(du);
+                app.outputs(now, Some(du), sample, out);
+            }
+            _ => {
+                self.refuse(now, out);
+                return self.unlock(SlaveCause::OutputLength, now, app, out);
+            }
+        }
+        self.passive.reply(now, Status::Dl, self.identity.inputs.into(), out, |du| app.inputs(du));
+    }
+
+    fn slave_diag(&mut self, now: Local, out: &mut Outbox) {
+        let diagnosis = self.diagnosis().emit();
+        self.passive.reply(now, Status::Dl, diagnosis.len(), out, |du| du.copy_from_slice(&diagnosis));
+    }
+    /// The diagnosis as Slave_Diag reads it (manual 5.1).
+    pub fn diagnosis(&self) -> Diagnosis<'static> {
+        let status = (self.fault | DiagStatus::BY_SLAVE)
+            .with(DiagStatus::STATION_NOT_READY, self.state != SlaveState::DataExch)
+            .with(DiagStatus::PRM_REQ, matches!(self.state, SlaveState::PowerOn | SlaveState::WaitPrm))
+            .with(DiagStatus::WD_ON, self.watchdog.is_some());
+        Diagnosis { status, master: self.master, ident: self.identity.ident, extended: &[] }
+    }
+
+    fn set_prm(&mut self, now: Local, sa: Address, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
+        if self.is_foreign(sa) {
+            return self.refuse(now, out);
+        }
+        self.passive.acknowledge(now, out);
+        let Ok(prm) = SetPrm::parse(du) else {
+            return self.fail(DiagStatus::PRM_FAULT, SlaveCause::PrmFault, now, app, out);
+        };
+        match (prm.status.lock(), prm.status.unlock()) {
+            // min T_SDR alone, whatever the ident number (EN 50170-2).
+            (false, false) => self.passive.set_min_tsdr(Tbit(prm.min_tsdr.into())),
+            (_, true) => self.unlock(SlaveCause::Unlocked, now, app, out),
+            (true, false) => match self.check_prm(&prm, app) {
+                Ok(()) => self.parameterise(now, sa, &prm, app, out),
+                Err(fault) => self.fail(fault, SlaveCause::PrmFault, now, app, out),
+            },
+        }
+    }
+    fn check_prm(&self, prm: &SetPrm<'_>, app: &impl Application) -> Result<(), DiagStatus> {
+        if prm.status.sync() || prm.status.freeze() {
+            return Err(DiagStatus::NOT_SUPPORTED);
+        }
+        let own = prm.ident == self.identity.ident
+            && (self.identity.fail_safe || !prm.dpv1.fail_safe())
+            && (self.identity.publisher || !prm.dpv1.publisher_enable());
+        let good = own && prm.check().is_ok() && app.check(prm).is_ok();
+        if good { Ok(()) } else { Err(DiagStatus::PRM_FAULT) }
+    }
+    fn parameterise(
+        &mut self,
+        now: Local,
+        sa: Address,
+        prm: &SetPrm<'_>,
+        app: &mut impl Application,
+        out: &mut Outbox,
+    ) {
+        // The device leaves data exchange with its old parameters before it gets new ones.
+        self.enter(SlaveState::WaitCfg, SlaveCause::Parameterised, now, app, out);
+        self.master = Some(sa);
+        self.fault = DiagStatus::default();
+        self.group = prm.group;
+        self.fail_safe = prm.dpv1.fail_safe();
+        self.dpv1 = prm.dpv1.dpv1_enable();
+        self.passive.set_min_tsdr(Tbit(prm.min_tsdr.into()));
+        let step = Span::from_ms(prm.watchdog_base_ms().into());
+        self.watchdog = prm.watchdog_units().map(|units| step * units.into());
+        out.disarm(Timer::Watchdog);
+        self.retrigger(now, out);
+        app.parameterise(prm);
+    }
+
+    fn chk_cfg(&mut self, now: Local, sa: Address, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
+        if self.state == SlaveState::WaitPrm || self.is_foreign(sa) {
+            return self.refuse(now, out);
+        }
+        self.passive.acknowledge(now, out);
+        if du != self.identity.config {
+            self.fail(DiagStatus::CFG_FAULT, SlaveCause::CfgFault, now, app, out);
+        } else if self.state == SlaveState::WaitCfg {
+            self.enter(SlaveState::DataExch, SlaveCause::Configured, now, app, out);
+        }
+    }
+
+    fn broadcast(&mut self, now: Local, header: &Header, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
+        let control = (header.dsap, header.ssap) == (Some(Sap::GLOBAL_CONTROL), Some(Sap::MASTER_MS0));
+        if !control || self.state != SlaveState::DataExch || self.is_foreign(header.sa) {
+            return;
+        }
+        match GlobalControl::parse(du) {
+            Ok(control) if control.is_synch() => app.synch(now, out),
+            Ok(control) if control.selects(self.group) => app.operate(now, !control.clear, out),
+            _ => {}
+        }
+    }
+
+    fn fail(&mut self, fault: DiagStatus, cause: SlaveCause, now: Local, app: &mut impl Application, out: &mut Outbox) {
+        self.unlock(cause, now, app, out);
+        self.fault = fault;
+    }
+    fn unlock(&mut self, cause: SlaveCause, now: Local, app: &mut impl Application, out: &mut Outbox) {
+        self.master = None;
+        self.watchdog = None;
+        self.fault = DiagStatus::default();
+        out.disarm(Timer::Watchdog);
+        self.enter(SlaveState::WaitPrm, cause, now, app, out);
+    }
+    fn enter(
+        &mut self,
+        state: SlaveState,
+        cause: SlaveCause,
+        now: Local,
+        app: &mut impl Application,
+        out: &mut Outbox,
+    ) {
+        let from = core::mem::replace(&mut self.state, state);
+        out.observe(Observation::SlaveState { from, to: state, cause });
+        if from == SlaveState::DataExch && state != SlaveState::DataExch {
+            self.outputs = [0; MAX_OUTPUTS];
+            self.ms1.reset();
+            app.leave(now, out);
+        }
+        if state == SlaveState::DataExch {
+            app.enter(now, out);
+        }
+    }
+}

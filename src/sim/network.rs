@@ -1,0 +1,432 @@
+//! The network: stations on a line, and the one loop that makes time pass.
+//!
+//! Events are ordered by (time, phase, station, per-station number), see [`queue`](super::queue). A station's events
+//! are numbered by this station alone, and each random stream belongs to one station, so that a station more or less
+//! changes nothing for the others.
+
+use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
+use crate::observation::{self, Observation};
+use crate::sim::bus::{Bus, FlightId, Place};
+use crate::sim::crystal::Crystal;
+use crate::sim::fault::Disturbance;
+use crate::sim::motion::{Resolution, Shaft};
+use crate::sim::noise::JitterSource;
+use crate::sim::queue::{Key, NearQueue, Phase, Queue};
+use crate::sim::record::{Recorder, Stamp, Transmission};
+use crate::time::{BitRate, Local, Time};
+use crate::wire::Address;
+
+/// One station and the world around it.
+#[derive(Clone, Debug)]
+pub struct Site<S> {
+    /// The machine.
+    pub machine: S,
+    /// Where it is on the line.
+    pub place: Place,
+    /// Its crystal.
+    pub crystal: Crystal,
+    /// The shaft it senses, and how finely.
+    pub shaft: Option<(Shaft, Resolution)>,
+    /// When its supply comes on.
+    pub powered_at: Time,
+}
+
+/// When the scenario orders something.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum When {
+    /// At an instant.
+    Time(Time),
+    /// When the cycle of this number begins, just before the master learns of it.
+    Cycle(u64),
+}
+
+/// What the scenario orders.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Act<C> {
+    /// Supply on.
+    PowerOn,
+    /// Supply off: the station hears, does and says nothing.
+    PowerOff,
+    /// Something that the station's machine understands.
+    Command(C),
+}
+
+/// How far to run.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Until {
+    /// To this instant.
+    Time(Time),
+    /// Until the cycle of this number begins.
+    Cycle(u64),
+}
+
+/// Deadlines of a station: the timers, and the asked sample behind them.
+const DEADLINES: usize = Timer::ALL.len() + 1;
+
+/// A deadline. Only one event of it counts at a time; arming it later than that event costs nothing until it comes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Deadline {
+    /// Armed for this reading of the station's crystal, and the true time of it.
+    due: Option<(Local, Time)>,
+    /// Time of the event in the queue that counts.
+    queued: Option<Time>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Event {
+    Act(u32),
+    Telegram(FlightId),
+    Sent,
+    Deadline(u8),
+}
+
+struct Slot<S> {
+    site: Site<S>,
+    address: Address,
+    filter: Filter,
+    powered: bool,
+    sample_with_telegrams: bool,
+    deadlines: [Deadline; DEADLINES],
+    /// Number of the station's next event.
+    number: u64,
+}
+
+/// A network in time. `Q` is the event queue; any queue gives the same run.
+pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
+    rate: BitRate,
+    slots: Vec<Slot<S>>,
+    /// Slot of each address.
+    by_address: [Option<u8>; 128],
+    /// Slots that hear more than what is for them or for everybody.
+    curious: Vec<u8>,
+    bus: Bus,
+    queue: Q,
+    jitter: JitterSource,
+    disturbances: Vec<Disturbance>,
+    acts: Vec<(usize, Act<S::Command>)>,
+    /// Acts bound to cycles, by cycle.
+    cycle_acts: Vec<(u64, usize)>,
+    next_cycle_act: usize,
+    now: Time,
+    /// SYNCH telegrams that the master has sent, lost ones included.
+    clocks: u64,
+    out: Outbox,
+}
+
+/// An event of a network. Opaque: only queues handle it.
+#[derive(Clone, Copy, Debug)]
+pub struct NetworkEvent(Event);
+
+impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
+    /// A network at rest at time zero. Stations are switched on at their own instants.
+    ///
+    /// # Panics
+    /// If two stations have one address, or there are more than 127: the caller checks scenarios.
+    pub fn new(rate: BitRate, sites: Vec<Site<S>>, jitter: JitterSource, disturbances: Vec<Disturbance>) -> Self {
+        let mut by_address = [None; 128];
+        let mut slots = Vec::with_capacity(sites.len());
+        for (index, site) in sites.into_iter().enumerate() {
+            let address = site.machine.address();
+            let place = &mut by_address[usize::from(address.get())];
+            assert!(place.is_none(), "two stations with address {address}");
+            *place = Some(index as u8);
+            let filter = site.machine.filter();
+            slots.push(Slot {
+                site,
+                address,
+                filter,
+                powered: false,
+                sample_with_telegrams: false,
+                deadlines: [Deadline::default(); DEADLINES],
+                number: 0,
+            });
+        }
+        let mut network = Self {
+            rate,
+            slots,
+            by_address,
+            curious: Vec::new(),
+            bus: Bus::default(),
+            queue: Q::default(),
+            jitter,
+            disturbances,
+            acts: Vec::new(),
+            cycle_acts: Vec::new(),
+            next_cycle_act: 0,
+            now: Time::ZERO,
+            clocks: 0,
+            out: Outbox::new(),
+        };
+        network.sort_listeners();
+        for index in 0..network.slots.len() {
+            let (address, at) = (network.slots[index].address, network.slots[index].site.powered_at);
+            network.order(When::Time(at), address, Act::PowerOn);
+        }
+        network
+    }
+
+    /// Orders `act` for the station at `address`; an address without station is ignored.
+    pub fn order(&mut self, when: When, address: Address, act: Act<S::Command>) {
+        let Some(slot) = self.by_address[usize::from(address.get())] else { return };
+        self.acts.push((slot.into(), act));
+        let act = self.acts.len() - 1;
+        match when {
+            When::Time(at) => self.push(at.max(self.now), Phase::Command, slot.into(), Event::Act(act as u32)),
+            When::Cycle(cycle) => {
+                let at = self.cycle_acts.partition_point(|&(other, _)| other <= cycle);
+                self.cycle_acts.insert(at, (cycle, act));
+            }
+        }
+    }
+
+    /// True time now.
+    pub const fn now(&self) -> Time {
+        self.now
+    }
+    /// Cycles begun.
+    pub const fn cycles(&self) -> u64 {
+        self.clocks
+    }
+    /// The machine at `address`.
+    pub fn station(&self, address: Address) -> Option<&S> {
+        let slot = self.by_address[usize::from(address.get())]?;
+        Some(&self.slots[usize::from(slot)].site.machine)
+    }
+
+    /// Runs for at most `budget` events. Tells whether `until` is reached.
+    pub fn run<R: Recorder>(&mut self, until: Until, budget: u64, recorder: &mut R) -> bool {
+        for _ in 0..budget {
+            let over = match until {
+                Until::Cycle(cycle) => self.clocks > cycle,
+                Until::Time(end) => self.queue.peek().is_none_or(|key| key.time() > end),
+            };
+            if over || !self.next(recorder) {
+                if let Until::Time(end) = until {
+                    self.now = end;
+                }
+                return true;
+            }
+        }
+        false
+    }
+
+    /// The next event. False when nothing will ever happen again.
+    fn next<R: Recorder>(&mut self, recorder: &mut R) -> bool {
+        let Some((key, NetworkEvent(event))) = self.queue.pop() else { return false };
+        self.now = key.time();
+        let slot = usize::from(self.by_address[usize::from(key.station())].expect("events belong to stations"));
+        match event {
+            Event::Act(act) => self.act(act as usize, recorder),
+            Event::Telegram(id) => self.telegram(slot, id, recorder),
+            Event::Sent => self.sent(slot, recorder),
+            Event::Deadline(which) => self.deadline(slot, usize::from(which), recorder),
+        }
+        true
+    }
+
+    fn act<R: Recorder>(&mut self, act: usize, recorder: &mut R) {
+        let (slot, act) = self.acts[act];
+        match act {
+            Act::PowerOn if !self.slots[slot].powered => {
+                self.slots[slot].powered = true;
+                self.tell(slot, &Observation::Power { on: true }, recorder);
+                self.step(slot, self.local(slot), Input::PowerOn, recorder);
+            }
+            Act::PowerOn => {}
+            Act::PowerOff => {
+                self.tell(slot, &Observation::Power { on: false }, recorder);
+                let slot = &mut self.slots[slot];
+                slot.powered = false;
+                for deadline in &mut slot.deadlines {
+                    deadline.due = None;
+                }
+            }
+            Act::Command(command) => self.step(slot, self.local(slot), Input::Command(command), recorder),
+        }
+    }
+    /// Tells what happened to a station and was not its own doing.
+    fn tell<R: Recorder>(&self, slot: usize, what: &Observation, recorder: &mut R) {
+        let Slot { address, site, .. } = &self.slots[slot];
+        recorder.observe(Stamp { at: self.now, station: *address, crystal: &site.crystal }, what);
+    }
+    fn local(&self, slot: usize) -> Local {
+        self.slots[slot].site.crystal.to_local(self.now)
+    }
+
+    fn telegram<R: Recorder>(&mut self, slot: usize, id: FlightId, recorder: &mut R) {
+        let station = &self.slots[slot];
+        let sample = if station.sample_with_telegrams { self.raw(slot) } else { 0 };
+        let now = self.local(slot);
+        if station.powered {
+            self.out.clear();
+            let octets = self.bus.flight(id).frame.octets();
+            let input = Input::Telegram(Heard { octets, sample });
+            self.slots[slot].site.machine.step(now, input, &mut self.out);
+            self.bus.heard(id);
+            self.carry_out(slot, now, recorder);
+        } else {
+            self.bus.heard(id);
+        }
+    }
+    /// The shaft's raw position now (steps); zero without a shaft.
+    fn raw(&self, slot: usize) -> u32 {
+        self.slots[slot].site.shaft.as_ref().map_or(0, |(shaft, resolution)| resolution.raw(shaft.angle(self.now)))
+    }
+
+    fn sent<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
+        let cycle = self.clocks;
+        self.clocks += 1;
+        while let Some(&(_, act)) = self.cycle_acts.get(self.next_cycle_act).filter(|&&(due, _)| due <= cycle) {
+            self.next_cycle_act += 1;
+            self.act(act, recorder);
+        }
+        self.step(slot, self.local(slot), Input::Sent, recorder);
+    }
+
+    fn deadline<R: Recorder>(&mut self, slot: usize, which: usize, recorder: &mut R) {
+        let now = self.now;
+        let deadline = &mut self.slots[slot].deadlines[which];
+        if deadline.queued != Some(now) {
+            return; // An earlier arming took its place.
+        }
+        deadline.queued = None;
+        let Some((local, due)) = deadline.due else { return };
+        if due > now {
+            deadline.queued = Some(due);
+            return self.push(due, Phase::Deadline, slot, Event::Deadline(which as u8));
+        }
+        deadline.due = None;
+        let input = match Timer::ALL.get(which) {
+            Some(&timer) => Input::Deadline {
+                timer,
+                busy: timer == Timer::Slot && self.bus.is_busy(now, self.slots[slot].site.place),
+            },
+            None => Input::Sample(self.raw(slot)),
+        };
+        self.step(slot, local, input, recorder);
+    }
+
+    fn step<R: Recorder>(&mut self, slot: usize, now: Local, input: Input<'_, S::Command>, recorder: &mut R) {
+        if self.slots[slot].powered {
+            self.out.clear();
+            self.slots[slot].site.machine.step(now, input, &mut self.out);
+            self.carry_out(slot, now, recorder);
+        }
+    }
+
+    /// Does what the station has put into the outbox.
+    fn carry_out<R: Recorder>(&mut self, slot: usize, now: Local, recorder: &mut R) {
+        let station = &mut self.slots[slot];
+        let stamp = Stamp { at: self.now, station: station.address, crystal: &station.site.crystal };
+        for seen in self.out.observations() {
+            recorder.observe(stamp, seen);
+        }
+        if let Some(on) = self.out.sampling_with_telegrams() {
+            station.sample_with_telegrams = on;
+        }
+        let filter = station.site.machine.filter();
+        if filter != station.filter {
+            station.filter = filter;
+            self.sort_listeners();
+        }
+        for (which, order) in self.out.orders().iter().copied().chain([self.out.sample_order()]).enumerate() {
+            match order {
+                Order::Keep => {}
+                Order::Off => self.slots[slot].deadlines[which].due = None,
+                Order::At(at) => Self::arm(&mut self.queue, &mut self.slots[slot], which, at.max(now), self.now),
+            }
+        }
+        self.transmit(slot, recorder);
+    }
+
+    fn arm(queue: &mut Q, slot: &mut Slot<S>, which: usize, at: Local, now: Time) {
+        let due = slot.site.crystal.to_true(at).max(now);
+        let deadline = &mut slot.deadlines[which];
+        deadline.due = Some((at, due));
+        if deadline.queued.is_none_or(|queued| queued > due) {
+            deadline.queued = Some(due);
+            let key = Key::new(due, Phase::Deadline, slot.address.get(), slot.number);
+            slot.number += 1;
+            queue.push(key, NetworkEvent(Event::Deadline(which as u8)));
+        }
+    }
+    fn push(&mut self, at: Time, phase: Phase, slot: usize, event: Event) {
+        let slot = &mut self.slots[slot];
+        self.queue.push(Key::new(at, phase, slot.address.get(), slot.number), NetworkEvent(event));
+        slot.number += 1;
+    }
+
+    /// Puts the telegram in the outbox, if there is one, onto the line.
+    fn transmit<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
+        let Some((send, frame)) = self.out.sending() else { return };
+        let Slot { site, address, .. } = &self.slots[slot];
+        let address = *address;
+        let mut start = site.crystal.to_true(send.at);
+        let mut end = site.crystal.to_true(send.at + self.rate.octets(frame.len()));
+        if send.clock {
+            let jitter = self.jitter.draw().max(self.now - start);
+            start += jitter;
+            end += jitter;
+        }
+        let lost = self
+            .disturbances
+            .iter()
+            .any(|what| what.loses(self.clocks_begun(send.clock), address, send.clock, frame.octets()));
+        if send.clock {
+            // The master's transmitter runs, whatever becomes of the telegram.
+            self.push(end, Phase::Edge, slot, Event::Sent);
+        }
+        if lost {
+            let how = observation::Disturbance::Lost;
+            return self.tell(slot, &Observation::Disturbed { how }, recorder);
+        }
+        let Some((_, frame)) = self.out.sending() else { return };
+        recorder.telegram(&Transmission { start, end, sender: address, octets: frame.octets() });
+        let (id, hit) = self.bus.send(slot, self.slots[slot].site.place, (start, end), frame);
+        if let Some(with) = hit {
+            self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
+        }
+        self.deliver(slot, id, end);
+    }
+    /// The running cycle, or the one that the SYNCH being sent will begin.
+    fn clocks_begun(&self, clock: bool) -> u64 {
+        if clock { self.clocks } else { self.clocks.saturating_sub(1) }
+    }
+
+    /// Tells every listener when the telegram's end will reach it.
+    fn deliver(&mut self, sender: usize, id: FlightId, end: Time) {
+        let route = Route::of(self.bus.flight(id).frame.octets());
+        let mut heard = false;
+        if matches!(route, Some(Route { da: Route::TO_ALL, reply: false, .. })) {
+            for listener in 0..self.slots.len() {
+                heard |= self.deliver_to(listener, sender, id, end, route);
+            }
+        } else {
+            for index in 0..self.curious.len() {
+                heard |= self.deliver_to(self.curious[index].into(), sender, id, end, route);
+            }
+            let addressed = route.and_then(|route| self.by_address[usize::from(route.da)]);
+            if let Some(listener) = addressed.filter(|slot| !self.curious.contains(slot)) {
+                heard |= self.deliver_to(listener.into(), sender, id, end, route);
+            }
+        }
+        if !heard {
+            self.bus.unheard(id);
+        }
+    }
+    fn deliver_to(&mut self, listener: usize, sender: usize, id: FlightId, end: Time, route: Option<Route>) -> bool {
+        if listener == sender || !self.slots[listener].filter.passes(route) {
+            return false;
+        }
+        let delay = self.slots[listener].site.place.delay(self.slots[sender].site.place);
+        self.bus.add_listener(id);
+        self.push(end + delay, Phase::Telegram, listener, Event::Telegram(id));
+        true
+    }
+    fn sort_listeners(&mut self) {
+        self.curious.clear();
+        let curious =
+            |(index, slot): (usize, &Slot<S>)| (slot.filter.all || slot.filter.publishers != 0).then_some(index as u8);
+        self.curious.extend(self.slots.iter().enumerate().filter_map(curious));
+    }
+}

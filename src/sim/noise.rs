@@ -1,0 +1,478 @@
+//! Noise: random streams with names, the distributions drawn from them, and the jitter of the master's clock.
+//!
+//! Every draw belongs to (seed, station, purpose): the three are written side by side into the key of a ChaCha8
+//! generator, so adding a station, a metric or a trace leaves all other draws as they are. The distributions are our
+//! own few lines, in integers, `sqrt` and `libm` alone: each value is the same on every machine and in every release.
+
+use crate::time::Span;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+/// Separates these keys from those of any other user of ChaCha8.
+const KEY_DOMAIN: [u8; 8] = *b"isodp/v1";
+
+macro_rules! purposes {
+    ($($(#[$doc:meta])* $name:ident = $key:literal;)*) => {
+        /// What a stream is drawn for.
+        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+        pub enum Purpose { $($(#[$doc])* $name,)* }
+
+        impl Purpose {
+            /// Every purpose.
+            pub const ALL: &'static [Self] = &[$(Self::$name,)*];
+
+            /// The eight octets that stand for the purpose in a stream's key. They never change: draws hang on them.
+            pub const fn key(self) -> [u8; 8] {
+                match self { $(Self::$name => *$key,)* }
+            }
+        }
+    };
+}
+purposes! {
+    /// Jitter of the master's SYNCH Global_Control.
+    GcJitter = b"gcjitter";
+    /// Offset of a station's crystal.
+    CrystalOffset = b"xtaloffs";
+    /// What a station's crystal shows when the run begins.
+    CrystalStart = b"xtalstrt";
+    /// Wander of a station's crystal.
+    CrystalWander = b"xtalwand";
+    /// A slave's T_SDR.
+    ResponseDelay = b"respdely";
+    /// The receiver's sampling of an edge.
+    Sampling = b"sampling";
+    /// The delay of cable and repeaters.
+    Propagation = b"propagat";
+    /// Frames that are lost.
+    FrameLoss = b"frame-ls";
+    /// Bits that arrive wrong.
+    BitError = b"biterror";
+    /// Frames that arrive twice.
+    Duplicate = b"duplicat";
+    /// Frames that arrive late.
+    Late = b"lateness";
+    /// Clocks that are missing.
+    ClockLoss = b"clockmis";
+    /// When a station falls silent, restarts or returns.
+    Outage = b"outage--";
+    /// When a station is switched on.
+    PowerOn = b"power-on";
+    /// Where a shaft stands when the run begins.
+    Shaft = b"shaftpos";
+    /// Acyclic requests of the master.
+    Acyclic = b"acyclic-";
+}
+
+/// A random stream: the draws of one station for one purpose.
+///
+/// A draw takes a number of 64-bit words that depends on the values drawn, never on the machine. No draw keeps
+/// anything for the next, so the kinds of draw may be mixed freely.
+#[derive(Clone, Debug)]
+pub struct Stream {
+    words: ChaCha8Rng,
+}
+
+impl Stream {
+    /// The stream of (`seed`, `station`, `purpose`), at its beginning.
+    pub fn new(seed: u64, station: u8, purpose: Purpose) -> Self {
+        let mut key = [0; 32];
+        key[..8].copy_from_slice(&seed.to_le_bytes());
+        key[8] = station;
+        key[16..24].copy_from_slice(&purpose.key());
+        key[24..].copy_from_slice(&KEY_DOMAIN);
+        Self { words: ChaCha8Rng::from_seed(key) }
+    }
+
+    /// An integer from 0 to `n` - 1, each equally likely.
+    ///
+    /// A word times `n` is a number whose upper half is the draw. `n` does not divide 2^64, so some draws would be one
+    /// word richer than others: the words that make up the surplus are refused and drawn again (Lemire, "Fast random
+    /// integer generation in an interval", 2019).
+    ///
+    /// # Panics
+    /// If `n` is 0.
+    pub fn below(&mut self, n: u64) -> u64 {
+        assert!(n > 0, "nothing to draw from");
+        loop {
+            let product = u128::from(self.words.next_u64()) * u128::from(n);
+            let rest = product as u64;
+            // The surplus, 2^64 mod n, is less than n: the division is rarely needed.
+            if rest >= n || rest >= n.wrapping_neg() % n {
+                return (product >> 64) as u64;
+            }
+        }
+    }
+
+    /// A whole number of ticks from -`half_width` to +`half_width`, both included, each equally likely.
+    ///
+    /// # Panics
+    /// If `half_width` is negative.
+    pub fn uniform(&mut self, half_width: Span) -> Span {
+        assert!(half_width >= Span::ZERO, "half width {half_width} is negative");
+        let count = 2 * half_width.ticks() as u64 + 1;
+        Span::from_ticks((self.below(count) as i64).wrapping_sub(half_width.ticks()))
+    }
+
+    /// A standard normal number, mean 0 and standard deviation 1, never beyond ±12.
+    ///
+    /// Marsaglia's polar method: a point drawn from the square until it lies in the unit circle. Of the two normal
+    /// numbers that a point yields the second is thrown away, so that no draw leaves anything behind.
+    pub fn normal(&mut self) -> f64 {
+        loop {
+            let (u, v) = (self.coordinate(), self.coordinate());
+            let s = u * u + v * v;
+            if s < 1.0 {
+                return u * (-2.0 * libm::log(s) / s).sqrt();
+            }
+        }
+    }
+
+    /// A normal span with mean 0 and standard deviation `sigma`, rounded once to the nearest tick.
+    ///
+    /// # Panics
+    /// If `sigma` is negative.
+    pub fn normal_span(&mut self, sigma: Span) -> Span {
+        assert!(sigma >= Span::ZERO, "standard deviation {sigma} is negative");
+        Span::from_ticks(libm::round(self.normal() * sigma.ticks() as f64) as i64)
+    }
+
+    /// A normal span as [`Self::normal_span`], drawn again until it lies within ±`bound`, both included.
+    ///
+    /// # Panics
+    /// If `bound` is less than a quarter of `sigma`: four draws in five would be lost.
+    pub fn bounded_normal(&mut self, sigma: Span, bound: Span) -> Span {
+        assert!(reaches(sigma, bound), "bound {bound} is less than a quarter of the standard deviation {sigma}");
+        loop {
+            let span = self.normal_span(sigma);
+            if -bound <= span && span <= bound {
+                return span;
+            }
+        }
+    }
+
+    /// An odd multiple of 2^-52 between -1 and 1: exact, as often negative as positive, never 0.
+    fn coordinate(&mut self) -> f64 {
+        /// 2^-51.
+        const STEP: f64 = 1.0 / (1u64 << 51) as f64;
+        ((self.words.next_u64() >> 12) as f64 + 0.5) * STEP - 1.0
+    }
+}
+
+/// Whether `bound` is at least a quarter of `sigma`.
+fn reaches(sigma: Span, bound: Span) -> bool {
+    bound.ticks() >= sigma.ticks() / 4 + i64::from(sigma.ticks() % 4 > 0)
+}
+
+/// How the master's SYNCH strays from its nominal instant (Model: D1, the send instant of that one telegram).
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum GcJitter {
+    /// Not at all.
+    #[default]
+    None,
+    /// Equally likely anywhere between -`half_width` and +`half_width`.
+    Uniform {
+        /// Largest deviation, 0 ..= [`GcJitter::LIMIT`].
+        half_width: Span,
+    },
+    /// Normal.
+    Normal {
+        /// Standard deviation, 0 ..= [`GcJitter::LIMIT`].
+        sigma: Span,
+    },
+    /// Normal, drawn again until it lies within the bound.
+    BoundedNormal {
+        /// Standard deviation before the bound, 0 ..= [`GcJitter::LIMIT`].
+        sigma: Span,
+        /// Largest deviation, `sigma` / 4 ..= [`GcJitter::LIMIT`].
+        bound: Span,
+    },
+}
+
+/// A kind of jitter as a user meets it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct JitterKind {
+    /// The word for it in a scenario.
+    pub name: &'static str,
+    /// What it does, in a sentence.
+    pub what: &'static str,
+    /// Its parameters in a scenario, all of them spans.
+    pub parameters: &'static [&'static str],
+}
+
+/// Every kind of jitter, in the order of [`GcJitter`]'s variants.
+pub const KINDS: &[JitterKind] = &[
+    JitterKind { name: "none", what: "every clock leaves at its nominal instant", parameters: &[] },
+    JitterKind { name: "uniform", what: "equally likely anywhere within the half width", parameters: &["half_width"] },
+    JitterKind { name: "normal", what: "normal with the given standard deviation", parameters: &["sigma"] },
+    JitterKind {
+        name: "bounded_normal",
+        what: "normal, drawn again until it lies within the bound",
+        parameters: &["sigma", "bound"],
+    },
+];
+
+/// Why a jitter cannot be.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum JitterError {
+    /// A parameter is negative.
+    #[error("{parameter} = {value} is negative")]
+    Negative {
+        /// The parameter's name as in [`KINDS`].
+        parameter: &'static str,
+        /// Its value.
+        value: Span,
+    },
+    /// A parameter is larger than the longest T_DP.
+    #[error("{parameter} = {value} is longer than the longest T_DP, {limit}", limit = GcJitter::LIMIT)]
+    TooLong {
+        /// The parameter's name as in [`KINDS`].
+        parameter: &'static str,
+        /// Its value.
+        value: Span,
+    },
+    /// The bound cuts so much away that the rest is no normal distribution and most draws are lost.
+    #[error("bound = {bound} is less than a quarter of sigma = {sigma}; uniform jitter is nearly the same")]
+    BoundTooTight {
+        /// Standard deviation.
+        sigma: Span,
+        /// Largest deviation.
+        bound: Span,
+    },
+}
+
+impl GcJitter {
+    /// The longest T_DP: no parameter is longer (Model: D3).
+    pub const LIMIT: Span = Span::from_ms(32);
+
+    /// The row of [`KINDS`] for this jitter.
+    pub fn kind(&self) -> &'static JitterKind {
+        &KINDS[match self {
+            Self::None => 0,
+            Self::Uniform { .. } => 1,
+            Self::Normal { .. } => 2,
+            Self::BoundedNormal { .. } => 3,
+        }]
+    }
+
+    /// The parameters with their values, in the order of [`JitterKind::parameters`].
+    fn values(&self) -> [Option<Span>; 2] {
+        match *self {
+            Self::None => [None, None],
+            Self::Uniform { half_width } => [Some(half_width), None],
+            Self::Normal { sigma } => [Some(sigma), None],
+            Self::BoundedNormal { sigma, bound } => [Some(sigma), Some(bound)],
+        }
+    }
+
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// The first parameter that is negative or longer than [`Self::LIMIT`], or a bound less than a quarter of sigma.
+    pub fn check(&self) -> Result<(), JitterError> {
+        for (&parameter, value) in self.kind().parameters.iter().zip(self.values().into_iter().flatten()) {
+            if value < Span::ZERO {
+                return Err(JitterError::Negative { parameter, value });
+            }
+            if value > Self::LIMIT {
+                return Err(JitterError::TooLong { parameter, value });
+            }
+        }
+        match *self {
+            Self::BoundedNormal { sigma, bound } if !reaches(sigma, bound) => {
+                Err(JitterError::BoundTooTight { sigma, bound })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The jitter of one master, clock by clock.
+#[derive(Clone, Debug)]
+pub struct JitterSource {
+    jitter: GcJitter,
+    stream: Stream,
+}
+
+impl JitterSource {
+    /// The jitter of the master `station` in a run with `seed`.
+    ///
+    /// # Errors
+    /// Those of [`GcJitter::check`].
+    pub fn new(jitter: GcJitter, seed: u64, station: u8) -> Result<Self, JitterError> {
+        jitter.check()?;
+        Ok(Self { jitter, stream: Stream::new(seed, station, Purpose::GcJitter) })
+    }
+
+    /// How much later than nominal the next clock leaves. Signed.
+    pub fn draw(&mut self) -> Span {
+        match self.jitter {
+            GcJitter::None => Span::ZERO,
+            GcJitter::Uniform { half_width } => self.stream.uniform(half_width),
+            GcJitter::Normal { sigma } => self.stream.normal_span(sigma),
+            GcJitter::BoundedNormal { sigma, bound } => self.stream.bounded_normal(sigma, bound),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SEED: u64 = 0x0123_4567_89ab_cdef;
+    const US: Span = Span::from_us(1);
+
+    fn stream(station: u8, purpose: Purpose) -> Stream {
+        Stream::new(SEED, station, purpose)
+    }
+    fn eight(jitter: GcJitter) -> [i64; 8] {
+        let mut source = JitterSource::new(jitter, SEED, 2).unwrap();
+        [(); 8].map(|()| source.draw().ticks())
+    }
+    /// One of each variant: a new one does not compile until it is listed here.
+    fn one_of_each() -> Vec<GcJitter> {
+        let mut all = vec![GcJitter::None];
+        loop {
+            all.push(match all[all.len() - 1] {
+                GcJitter::None => GcJitter::Uniform { half_width: US },
+                GcJitter::Uniform { .. } => GcJitter::Normal { sigma: US },
+                GcJitter::Normal { .. } => GcJitter::BoundedNormal { sigma: US, bound: Span::from_ns(500) },
+                GcJitter::BoundedNormal { .. } => return all,
+            });
+        }
+    }
+    /// Largest distance between the draws' distribution and the one expected, as Kolmogorov and Smirnov measure it.
+    fn distance(mut draws: Vec<f64>, expected: impl Fn(f64) -> f64) -> f64 {
+        draws.sort_by(f64::total_cmp);
+        let n = draws.len() as f64;
+        let gaps = draws.iter().enumerate().map(|(i, &x)| {
+            let p = expected(x);
+            (p - i as f64 / n).max((i + 1) as f64 / n - p)
+        });
+        gaps.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn every_kind_is_registered_with_its_parameters() {
+        let all = one_of_each();
+        assert_eq!(all.len(), KINDS.len());
+        for (jitter, row) in all.iter().zip(KINDS) {
+            assert_eq!(jitter.kind(), row);
+            assert_eq!(jitter.values().into_iter().flatten().count(), row.parameters.len(), "{}", row.name);
+            assert!(jitter.check().is_ok());
+        }
+    }
+
+    #[test]
+    fn every_purpose_has_its_own_key() {
+        for (i, a) in Purpose::ALL.iter().enumerate() {
+            assert!(Purpose::ALL[..i].iter().all(|b| b.key() != a.key()), "{a:?}");
+        }
+    }
+
+    #[test]
+    fn draws_never_change_from_release_to_release() {
+        // Computed a second time, from the written rules, outside of this crate.
+        let golden: [[i64; 8]; 4] = [
+            [0; 8],
+            [-8_372, -6_931, 5_820, -7_980, -4_114, -11_958, -2_149, 9_256],
+            [-5_818, 6_241, -2_623, 140, 3_120, -11_033, 3_628, 4_517],
+            [-5_818, -2_623, 140, 3_120, 3_628, 4_517, -4_637, -4_624],
+        ];
+        for (jitter, expected) in one_of_each().into_iter().zip(golden) {
+            assert_eq!(eight(jitter), expected, "{jitter:?}");
+        }
+        let mut words = stream(2, Purpose::GcJitter);
+        assert_eq!([(); 4].map(|()| words.below(1_000_000)), [151_189, 211_213, 742_479, 167_515]);
+    }
+
+    #[test]
+    fn streams_of_other_seeds_stations_and_purposes_differ() {
+        let draws = |mut stream: Stream| [(); 4].map(|()| stream.below(u64::MAX));
+        let mut seen = vec![draws(Stream::new(SEED + 1, 0, Purpose::GcJitter))];
+        for station in [0, 1, 2, 125] {
+            for &purpose in Purpose::ALL {
+                let these = draws(stream(station, purpose));
+                assert_eq!(these, draws(stream(station, purpose)));
+                assert!(seen.iter().flatten().all(|word| !these.contains(word)), "{station} {purpose:?}");
+                seen.push(these);
+            }
+        }
+    }
+
+    #[test]
+    fn neighbouring_streams_are_not_correlated() {
+        let (mut a, mut b) = (stream(3, Purpose::GcJitter), stream(4, Purpose::GcJitter));
+        let mean = (0..100_000).map(|_| a.normal() * b.normal()).sum::<f64>() / 1e5;
+        assert!(mean.abs() < 0.015, "{mean}");
+    }
+
+    #[test]
+    fn normal_draws_are_normal() {
+        let mut stream = stream(2, Purpose::Sampling);
+        let draws: Vec<f64> = (0..100_000).map(|_| stream.normal()).collect();
+        let mean = draws.iter().sum::<f64>() / 1e5;
+        let variance = draws.iter().map(|x| x * x).sum::<f64>() / 1e5;
+        assert!(mean.abs() < 0.015 && (variance - 1.0).abs() < 0.02, "{mean} {variance}");
+        assert!(draws.iter().all(|x| x.abs() < 12.0));
+        // 1.95 / sqrt(n) is passed by one series in a thousand; this one is fixed.
+        let d = distance(draws, |x| 0.5 * libm::erfc(-x / core::f64::consts::SQRT_2));
+        assert!(d < 1.95 / 1e5f64.sqrt(), "{d}");
+    }
+
+    #[test]
+    fn uniform_draws_are_uniform() {
+        let mut stream = stream(2, Purpose::Sampling);
+        let draws: Vec<f64> = (0..100_000).map(|_| stream.uniform(Span::from_ms(1)).ticks() as f64).collect();
+        let d = distance(draws, |x| 0.5 + x / 24e6);
+        assert!(d < 1.95 / 1e5f64.sqrt(), "{d}");
+        let mut counts = [0u32; 7];
+        for _ in 0..70_000 {
+            counts[(stream.uniform(Span::from_ticks(3)).ticks() + 3) as usize] += 1;
+        }
+        assert!(counts.iter().all(|n| (9_600..10_400).contains(n)), "{counts:?}");
+    }
+
+    #[test]
+    fn draws_reach_the_ends_of_the_range_and_stay_inside() {
+        let mut stream = stream(9, Purpose::FrameLoss);
+        assert_eq!(stream.below(1), 0);
+        assert_eq!(stream.uniform(Span::ZERO), Span::ZERO);
+        assert_eq!(stream.normal_span(Span::ZERO), Span::ZERO);
+        assert_eq!(stream.bounded_normal(Span::ZERO, Span::ZERO), Span::ZERO);
+        let widest: Vec<i64> = (0..1_000).map(|_| stream.uniform(Span::MAX).ticks()).collect();
+        assert!(widest.iter().any(|&t| t < i64::MIN / 8 * 7) && widest.iter().any(|&t| t > i64::MAX / 8 * 7));
+        // The largest surplus there is: nearly half of all words are refused.
+        let n = (1 << 63) + 1;
+        assert!((0..1_000).all(|_| stream.below(n) < n));
+        assert!((0..1_000).any(|_| stream.below(n) > n / 8 * 7));
+    }
+
+    #[test]
+    fn bounded_draws_never_pass_the_bound() {
+        let mut stream = stream(2, Purpose::GcJitter);
+        for bound in [US, US * 2, Span::from_ns(250)] {
+            let draws: Vec<Span> = (0..30_000).map(|_| stream.bounded_normal(US, bound)).collect();
+            assert!(draws.iter().all(|s| s.abs() <= bound));
+            assert!(draws.iter().any(|s| s.abs() > bound - Span::from_ns(50)));
+        }
+    }
+
+    #[test]
+    fn parameters_that_make_no_sense_are_named() {
+        let tick = Span::from_ticks(1);
+        for (jitter, text) in [
+            (GcJitter::Uniform { half_width: -US }, "half_width = -1 us is negative"),
+            (GcJitter::Normal { sigma: -tick }, "sigma = -0.083 ns is negative"),
+            (GcJitter::Normal { sigma: Span::from_ms(33) }, "sigma = 33 ms is longer than the longest T_DP, 32 ms"),
+            (GcJitter::BoundedNormal { sigma: US, bound: -US }, "bound = -1 us is negative"),
+            (
+                GcJitter::BoundedNormal { sigma: US, bound: Span::from_ns(250) - tick },
+                "bound = 249.917 ns is less than a quarter of sigma = 1 us; uniform jitter is nearly the same",
+            ),
+        ] {
+            assert_eq!(jitter.check().unwrap_err().to_string(), text);
+            assert!(JitterSource::new(jitter, SEED, 2).is_err());
+        }
+        assert!(GcJitter::BoundedNormal { sigma: US, bound: Span::from_ns(250) }.check().is_ok());
+    }
+}

@@ -1,0 +1,326 @@
+//! Build: from a scenario to a network that is ready to run, with the telegrams of a configuration tool.
+
+use crate::device::controller::{self, Controller};
+use crate::device::drive::{Drive, Subscriber};
+use crate::device::encoder::{Disc, Encoder};
+use crate::device::node::{Command, Node};
+use crate::device::unit::UnitSettings;
+use crate::dp::handler::SlaveParams;
+use crate::dp::iso::Rearm;
+use crate::dp::master::{Master, Settings};
+use crate::observation::MasterMode;
+use crate::sim::bus::Place;
+use crate::sim::crystal::Crystal;
+use crate::sim::motion::{Resolution, Shaft};
+use crate::sim::network::{self, Act, Network, NetworkEvent, Site};
+use crate::sim::noise::{JitterSource, Purpose, Stream};
+use crate::sim::queue::Queue;
+use crate::study::plan::Plan;
+use crate::study::scenario::{self, Action, CodeSequence, Scenario, Slave, When};
+use crate::time::{Local, Span, Time};
+use crate::wire::Address;
+use crate::wire::drive::G1Stw;
+use crate::wire::parameter::ParameterAddress;
+use crate::wire::prm::{DpV1Status, DxbLink, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81};
+
+/// Group 8, the clock's (Set_Prm octet 7).
+const CLOCK_GROUP: u8 = 0x80;
+/// A station's clock shows anything up to this when the run begins: clocks need not agree.
+const CLOCK_START: Span = Span::from_s(1);
+/// Data_Control_Time, where the master's watchdog does not set it.
+const DATA_CONTROL_TIME: Span = Span::from_ms(600);
+
+/// The data unit of Set_Prm for a slave of this scenario (manual 3.1).
+///
+/// # Panics
+/// If the scenario breaks a rule that reading it checks.
+pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
+    let bus = &scenario.bus.params;
+    let publisher = scenario.publishes(slave.address);
+    // A publisher's listeners need the time of an idle line (Model: D27).
+    let min_tsdr = if publisher { bus.t_id1() } else { bus.min_tsdr };
+    let watchdog = scenario.master.watchdog;
+    let prm = SetPrm {
+        status: (StationStatus::LOCK).with(StationStatus::WD_ON, watchdog.is_some()),
+        wd_fact_1: watchdog.map_or(1, |watchdog| watchdog.factor_1),
+        wd_fact_2: watchdog.map_or(1, |watchdog| watchdog.factor_2),
+        min_tsdr: min_tsdr.0 as u8,
+        ident: slave.device.ident,
+        group: CLOCK_GROUP,
+        dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::ISOM_REQ | DpV1Status::PRM_STRUCTURE)
+            .with(DpV1Status::FAIL_SAFE, slave.device.fail_safe)
+            .with(DpV1Status::PUBLISHER_ENABLE, publisher),
+        blocks: &[],
+    };
+    let builder = PrmBuilder::new(&prm).and_then(|builder| {
+        let builder = if slave.device.subscriber { Some(builder) } else { builder.user_81(&user_block(slave)) }?;
+        let builder = builder.iso_m(&iso_block(scenario, slave))?;
+        let links = links_to(scenario, slave.address);
+        if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }
+    });
+    builder.expect("a checked scenario fits into Set_Prm").octets().to_vec()
+}
+
+fn user_block(slave: &Slave) -> UserPrm81 {
+    let device = slave.device;
+    let scaling = slave.scaling;
+    UserPrm81 {
+        options: EncoderOptions::default()
+            .with(EncoderOptions::COUNTER_CLOCKWISE, slave.code_sequence == CodeSequence::Ccw)
+            .with(EncoderOptions::ACTIVATE, slave.functions)
+            .with(EncoderOptions::SCALING, scaling.is_some()),
+        units_per_revolution: scaling.map_or(device.steps_per_rev, |scaling| scaling.units_per_rev),
+        total_range: scaling.map_or(device.steps_per_rev * device.revolutions, |scaling| scaling.total_range),
+        max_failures: slave.max_life_failures,
+        reserved: [0; 7],
+    }
+}
+
+fn iso_block(scenario: &Scenario, slave: &Slave) -> IsoM {
+    let device = slave.device;
+    let units = |span: Span| (span.ticks() / Span::TICKS_PER_ISO_UNIT) as u32;
+    let t_dx = Plan::of(scenario).t_dx.ceil_to(Span::from_iso_units(1));
+    IsoM {
+        version: 1,
+        t_base_dp: device.t_base_dp,
+        t_dp: (units(scenario.master.t_dp) / device.t_base_dp) as u16,
+        t_mapc: scenario.master.t_mapc,
+        t_base_io: device.t_base_io,
+        t_i: (units(slave.times.t_i) / device.t_base_io) as u16,
+        t_o: (units(slave.times.t_o) / device.t_base_io) as u16,
+        t_dx: units(t_dx),
+        t_pll_w: units(slave.times.t_pll_w) as u16,
+        t_pll_d: units(slave.times.t_pll_d) as u16,
+    }
+}
+
+fn links_to(scenario: &Scenario, subscriber: Address) -> Vec<DxbLink> {
+    let links = scenario.links.iter().filter(|link| link.subscriber == subscriber);
+    let inputs = |publisher| scenario.slave(publisher).map_or(0, |slave| slave.device.inputs);
+    links
+        .map(|link| DxbLink {
+            publisher: link.publisher.get(),
+            length: inputs(link.publisher),
+            offset: link.offset,
+            sample: link.length,
+        })
+        .collect()
+}
+
+/// What the master knows of a slave beforehand.
+pub fn slave_params(scenario: &Scenario, slave: &Slave) -> SlaveParams {
+    SlaveParams {
+        address: slave.address,
+        prm: set_prm(scenario, slave),
+        cfg: slave.device.config.to_vec(),
+        outputs: slave.device.outputs,
+        inputs: slave.device.inputs,
+        publisher: scenario.publishes(slave.address),
+        fail_safe: slave.device.fail_safe,
+        get_cfg: scenario.master.get_cfg,
+    }
+}
+
+/// The network of a checked scenario.
+///
+/// # Panics
+/// If the scenario breaks a rule that reading it checks.
+pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> {
+    let seed = scenario.run.seed;
+    let master = scenario.master;
+    let mut sites = vec![Site {
+        machine: Node::Master(master_of(scenario)),
+        place: Place::at(master.position_mm),
+        crystal: crystal(seed, master.address, master.crystal),
+        shaft: None,
+        powered_at: Time::ZERO,
+    }];
+    sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
+    let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
+    let mut network = Network::new(scenario.bus.params.rate, sites, jitter, scenario.disturbances.clone());
+    for event in &scenario.events {
+        let when = match event.when {
+            When::Time(span) => network::When::Time(Time::ZERO + span),
+            When::Cycle(cycle) => network::When::Cycle(cycle),
+        };
+        for &(station, act) in &acts(master.address, &event.slaves, event.action) {
+            network.order(when, station, act);
+        }
+    }
+    network
+}
+
+fn master_of(scenario: &Scenario) -> Master<Controller> {
+    let master = &scenario.master;
+    // A station that is no slave to the master is not in its list.
+    let slaves: Vec<&Slave> = scenario.slaves.iter().filter(|slave| !slave.silent).collect();
+    let settings = Settings {
+        address: master.address,
+        bus: scenario.bus.params,
+        t_dp: master.t_dp,
+        rearm: if master.accumulate { Rearm::LastSent } else { Rearm::Grid },
+        dx_retries: master.dx_retries,
+        lost_after: master.lost_after.min(u16::MAX.into()) as u16,
+        clear_for: master.clear_for,
+        data_control_time: master.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
+        slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
+    };
+    let addresses = slaves.iter().map(|slave| slave.address);
+    Master::new(settings, Controller::new(addresses, master.t_mapc, master.life_start))
+}
+
+fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
+    let settings = UnitSettings {
+        clock_tolerance: slave.clock_tolerance,
+        ..UnitSettings::new(slave.address, scenario.bus.params.rate, slave.t_sdr)
+    };
+    let machine = if slave.silent {
+        Node::Silent(slave.address)
+    } else if slave.device.subscriber {
+        Node::Drive(Drive::new(slave.device, settings, Subscriber::default()))
+    } else {
+        Node::Encoder(Encoder::new(slave.device, settings, Disc::new(slave.device)))
+    };
+    let resolution = Resolution::new(slave.device.steps_per_rev, slave.device.revolutions);
+    let shaft = Shaft::new(&slave.motion).expect("a checked motion");
+    Site {
+        machine,
+        place: Place::at(slave.position_mm),
+        crystal: crystal(scenario.run.seed, slave.address, slave.crystal),
+        shaft: Some((shaft, resolution.expect("a profile's disc"))),
+        powered_at: Time::ZERO + slave.powered_at,
+    }
+}
+
+/// A station's crystal: its offset set or drawn, its start always drawn.
+fn crystal(seed: u64, station: Address, crystal: scenario::Crystal) -> Crystal {
+    let ppb = match crystal {
+        scenario::Crystal::Offset(ppb) => ppb,
+        scenario::Crystal::Within(ppb) => {
+            let mut stream = Stream::new(seed, station.get(), Purpose::CrystalOffset);
+            stream.uniform(Span::from_ticks(ppb)).ticks()
+        }
+    };
+    let mut stream = Stream::new(seed, station.get(), Purpose::CrystalStart);
+    let start = Local::from_ticks(stream.below(CLOCK_START.ticks() as u64) as i64);
+    Crystal::new(ppb, start).expect("a checked offset")
+}
+
+/// An action as orders to stations.
+fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Act<Command>)> {
+    let to_slaves = |act: Act<Command>| slaves.iter().map(|&slave| (slave, act)).collect();
+    let for_slaves = |order: &dyn Fn(Address) -> controller::Command| {
+        slaves.iter().map(|&slave| (master, Act::Command(Command::Application(order(slave))))).collect()
+    };
+    match action {
+        Action::PowerOff => to_slaves(Act::PowerOff),
+        Action::PowerOn => to_slaves(Act::PowerOn),
+        Action::ReadParameter { parameter, subindex, elements } => for_slaves(&|slave| {
+            let address = ParameterAddress { attribute: ParameterAddress::VALUE, elements, pnu: parameter, subindex };
+            controller::Command::ReadParameter(slave, address)
+        }),
+        Action::ChangeParameter { parameter, subindex, format, value } => for_slaves(&|slave| {
+            let address =
+                ParameterAddress { attribute: ParameterAddress::VALUE, elements: 1, pnu: parameter, subindex };
+            controller::Command::ChangeParameter(slave, address, format, value)
+        }),
+        Action::Startup { telegram, patch } => {
+            slaves.iter().map(|&slave| (master, Act::Command(Command::Patch(slave, telegram, patch)))).collect()
+        }
+        Action::Clear => vec![(master, Act::Command(Command::Mode(MasterMode::Clear)))],
+        Action::Operate => vec![(master, Act::Command(Command::Mode(MasterMode::Operate)))],
+        Action::Acknowledge => for_slaves(&controller::Command::Acknowledge),
+        Action::HoldLifeSign { cycles } => for_slaves(&|slave| controller::Command::HoldLife(slave, cycles)),
+        Action::ReleaseLifeSign => for_slaves(&controller::Command::ReleaseLife),
+        Action::JumpLifeSign { to } => for_slaves(&|slave| controller::Command::JumpLife(slave, to)),
+        Action::ControlWord { value } => for_slaves(&|slave| controller::Command::ControlWord(slave, G1Stw(value))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::profile;
+    use crate::fdl::params::BusParams;
+    use crate::observation::Observation;
+    use crate::sim::motion::Motion;
+    use crate::sim::network::Until;
+    use crate::sim::noise::GcJitter;
+    use crate::sim::queue::{HeapQueue, NearQueue};
+    use crate::sim::record::{Recorder, Stamp, Transmission};
+    use crate::study::scenario::*;
+    use crate::time::{BitRate, Tbit};
+
+    fn small() -> Scenario {
+        let slave = |n: u8, device: &str| Slave {
+            address: Address::new(n).unwrap(),
+            device: profile::find(device).unwrap(),
+            position_mm: u64::from(n) * 10_000,
+            crystal: scenario::Crystal::Within(50_000),
+            t_sdr: Tbit(30),
+            times: IsoTimes {
+                t_i: Span::from_us(125),
+                t_o: Span::from_us(1250),
+                t_pll_w: Span::from_us(1),
+                t_pll_d: Span::ZERO,
+            },
+            motion: Motion::Speed { start: crate::sim::motion::Angle::ZERO, micro_rpm: 1_500_000_000 },
+            max_life_failures: 1,
+            clock_tolerance: 1,
+            code_sequence: CodeSequence::Cw,
+            functions: false,
+            scaling: None,
+            silent: false,
+            powered_at: Span::ZERO,
+        };
+        let mut slaves: Vec<Slave> = (3..=10).map(|n| slave(n, "posital-ocd-dpb1b")).collect();
+        slaves.push(slave(11, "subscriber-drive"));
+        Scenario {
+            name: "small".into(),
+            question: String::new(),
+            run: Run { seed: 1, duration: Extent::Cycles(200) },
+            bus: Bus { params: BusParams::profile(BitRate::M12), cable_mm: 100_000 },
+            master: scenario::Master {
+                address: Address::new(2).unwrap(),
+                position_mm: 0,
+                crystal: scenario::Crystal::Offset(0),
+                t_dp: Span::from_ms(2),
+                t_mapc: 1,
+                watchdog: Watchdog::of(Span::from_ms(200)),
+                get_cfg: true,
+                dx_retries: 1,
+                lost_after: 10,
+                clear_for: 0,
+                gc_jitter: GcJitter::BoundedNormal { sigma: Span::from_ns(100), bound: Span::from_ns(400) },
+                accumulate: false,
+                life_start: 1,
+            },
+            slaves,
+            links: vec![Link {
+                publisher: Address::new(3).unwrap(),
+                subscriber: Address::new(11).unwrap(),
+                offset: 4,
+                length: 4,
+            }],
+            events: vec![],
+            disturbances: vec![],
+            record: Record { files: false, plots: false, tables: vec![], rows: 1 },
+        }
+    }
+
+    struct Print;
+    impl Recorder for Print {
+        fn telegram(&mut self, t: &Transmission<'_>) {
+            println!("{:>14.3} us  {:>4} -> {:02X?}", t.start.since_zero().as_us(), t.sender, t.octets);
+        }
+        fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+            println!("{:>14.3} us  {:>4}: {what}", stamp.at.since_zero().as_us(), stamp.station);
+        }
+    }
+    #[test]
+    fn smoke() {
+        let mut network: Network<Node, NearQueue<NetworkEvent>> = network(&small());
+        network.run(Until::Cycle(200), 1_000_000, &mut Print);
+        let _ = HeapQueue::<NetworkEvent>::default();
+    }
+}

@@ -1,0 +1,195 @@
+//! Counts: what happened how often in a run, and how long things took.
+
+use std::collections::BTreeMap;
+
+use super::layout::Layout;
+use crate::observation::{ClockVerdict, Observation, Phase, PllState, SlaveState};
+use crate::time::{Span, Time};
+use crate::wire::Address;
+
+/// Everything that is counted in one run.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Counts {
+    /// What concerns all stations.
+    pub network: NetworkCounts,
+    /// Per slave, in address order.
+    pub slaves: Vec<SlaveCounts>,
+}
+
+/// What is counted for the network as a whole.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct NetworkCounts {
+    /// True length of the run; zero until it is over.
+    pub duration: Span,
+    /// Cycles that began.
+    pub cycles: u64,
+    /// Requests that the master repeated.
+    pub retries: u64,
+    /// Requests that stayed without answer after all retries.
+    pub no_answers: u64,
+    /// SYNCHs that could not be sent when planned.
+    pub late_clocks: u64,
+    /// Tokens claimed after silence, the first one of a run included.
+    pub tokens_claimed: u64,
+    /// Telegrams that overlapped with another one.
+    pub collisions: u64,
+    /// Telegrams that the scenario disturbed.
+    pub disturbed: u64,
+    /// Observations that belong into the log of events.
+    pub events: u64,
+    /// Largest latch skew in counts \[steps\]; none if there was no skew.
+    pub skew_counts: Option<f64>,
+}
+
+/// What is counted for one slave.
+#[derive(Clone, PartialEq, Debug)]
+pub struct SlaveCounts {
+    /// The slave.
+    pub address: Address,
+    /// DP state at the end.
+    pub state: SlaveState,
+    /// Start-up phase at the end.
+    pub phase: Phase,
+    /// State of the clock recovery at the end.
+    pub pll: PllState,
+    /// How often each fault was latched, by its code in `G1_XIST2`.
+    pub faults: BTreeMap<u16, u64>,
+    /// Faults that were acknowledged.
+    pub acknowledgements: u64,
+    /// Clock failures: SYNCH outside the window or missing.
+    pub clock_failures: u64,
+    /// How the clock recovery locked for the first time; none if it did not.
+    pub lock: Option<Lock>,
+    /// How often the clock recovery locked again.
+    pub resynchronisations: u64,
+    /// True time in each start-up phase, by [`Phase`] number, from the beginning of the run to its end.
+    pub phases: [Span; Phase::ALL.len()],
+    /// Requests to this slave that the master repeated.
+    pub retries: u64,
+    /// Requests to this slave without answer after all retries.
+    pub no_answers: u64,
+    /// The first SYNCH that the clock recovery took, as true instant and number of begun cycles.
+    first: Option<(Time, u64)>,
+    /// When the present phase was entered.
+    since: Time,
+}
+
+/// From the first SYNCH that a slave's clock recovery took to its lock.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Lock {
+    /// Cycles that began in between.
+    pub cycles: u64,
+    /// True time in between.
+    pub span: Span,
+}
+
+impl Counts {
+    /// Nothing counted yet.
+    pub fn new(layout: &Layout) -> Self {
+        let slaves = layout.slaves().iter().map(|slave| SlaveCounts::new(slave.address)).collect();
+        Self { network: NetworkCounts::default(), slaves }
+    }
+
+    /// Counts what the master observed; `index` finds a slave.
+    pub(super) fn master(&mut self, what: &Observation, layout: &Layout) {
+        let slave = |address| layout.slave(address);
+        match *what {
+            Observation::CycleStart { .. } => self.network.cycles += 1,
+            Observation::ClockLate { .. } => self.network.late_clocks += 1,
+            Observation::TokenClaimed => self.network.tokens_claimed += 1,
+            Observation::Retry { slave: address } => {
+                self.network.retries += 1;
+                if let Some(index) = slave(address) {
+                    self.slaves[index].retries += 1;
+                }
+            }
+            Observation::NoAnswer { slave: address } => {
+                self.network.no_answers += 1;
+                if let Some(index) = slave(address) {
+                    self.slaves[index].no_answers += 1;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Counts what any station observed.
+    pub(super) fn station(&mut self, what: &Observation) {
+        match what {
+            Observation::Collision { .. } => self.network.collisions += 1,
+            Observation::Disturbed { .. } => self.network.disturbed += 1,
+            _ => {}
+        }
+        self.network.events += u64::from(what.is_event());
+    }
+
+    /// The run is over at `end`: closes what is still open.
+    pub(super) fn finish(&mut self, end: Time) {
+        self.network.duration = end.since_zero();
+        for slave in &mut self.slaves {
+            slave.phases[slave.phase as usize] += end - slave.since;
+            slave.since = end;
+        }
+    }
+}
+
+impl SlaveCounts {
+    fn new(address: Address) -> Self {
+        Self {
+            address,
+            state: SlaveState::PowerOn,
+            phase: Phase::Configuration,
+            pll: PllState::Idle,
+            faults: BTreeMap::new(),
+            acknowledgements: 0,
+            clock_failures: 0,
+            lock: None,
+            resynchronisations: 0,
+            phases: [Span::ZERO; Phase::ALL.len()],
+            retries: 0,
+            no_answers: 0,
+            first: None,
+            since: Time::ZERO,
+        }
+    }
+
+    /// Counts what this slave observed at `at`, `cycles` after the beginning.
+    pub(super) fn observe(&mut self, at: Time, cycles: u64, what: &Observation) {
+        match *what {
+            Observation::SlaveState { to, .. } => self.state = to,
+            Observation::Phase { from, to } => {
+                self.phases[from as usize] += at - self.since;
+                (self.phase, self.since) = (to, at);
+            }
+            Observation::Clock { verdict: ClockVerdict::First, .. } => {
+                self.first.get_or_insert((at, cycles));
+            }
+            Observation::Clock { verdict: ClockVerdict::Outside | ClockVerdict::Missing, .. } => {
+                self.clock_failures += 1;
+            }
+            Observation::Pll { to, .. } => self.pll(at, cycles, to),
+            Observation::Fault { code } => *self.faults.entry(code).or_insert(0) += 1,
+            Observation::Acknowledged { .. } => self.acknowledgements += 1,
+            _ => {}
+        }
+    }
+
+    fn pll(&mut self, at: Time, cycles: u64, to: PllState) {
+        self.pll = to;
+        if to != PllState::Locked {
+            return;
+        }
+        match (self.lock, self.first) {
+            (Some(_), _) => self.resynchronisations += 1,
+            (None, first) => {
+                let (since, begun) = first.unwrap_or((at, cycles));
+                self.lock = Some(Lock { cycles: cycles - begun, span: at - since });
+            }
+        }
+    }
+
+    /// All faults, whatever their code.
+    pub fn fault_count(&self) -> u64 {
+        self.faults.values().sum()
+    }
+}

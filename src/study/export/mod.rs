@@ -1,0 +1,191 @@
+//! Exports: the files that a run leaves, each readable by a tool that someone else wrote.
+//!
+//! All files of a run appear together at its end: each is written under a temporary name in the directory where it will
+//! stay and renamed when everything is whole. If anything fails, none of them stays.
+
+pub mod csv;
+pub mod decimal;
+pub mod hlog;
+pub mod json;
+pub mod staged;
+pub mod thinning;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+pub use staged::{ExportError, Staged};
+
+use super::histogram::Histograms;
+use super::layout::Layout;
+use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
+use super::scenario::CsvTable;
+use super::summary::Summary;
+
+/// What a run will be and where its files go.
+#[derive(Clone, Copy, Debug)]
+pub struct Target<'a> {
+    /// The directory; it is made if it does not exist.
+    pub dir: &'a Path,
+    /// The network.
+    pub layout: &'a Layout,
+    /// How many cycles the run will have, as far as known: tables are thinned by this ([`thinning::Thinning`]).
+    pub cycles: u64,
+    /// How many rows a table may have before it is thinned.
+    pub rows: u64,
+    /// Which tables are wanted.
+    pub tables: &'a [CsvTable],
+}
+
+/// One exporter at work: it takes rows during the run and hands over its files at the end.
+pub trait Export: Sink + Send {
+    /// Writes what is left and hands over all files. May add to the summary what a reader of its files must know.
+    ///
+    /// # Errors
+    /// The first one of the whole run.
+    fn close(self: Box<Self>, histograms: &Histograms, summary: &mut Summary) -> Result<Vec<Staged>, ExportError>;
+}
+
+/// One kind of export.
+#[derive(Clone, Copy, Debug)]
+pub struct Exporter {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// What it writes, for people.
+    pub what: &'static str,
+    /// The names of its files.
+    pub files: fn(&Target<'_>) -> Vec<String>,
+    /// Begins its files.
+    pub open: fn(&Target<'_>) -> Result<Box<dyn Export>, ExportError>,
+}
+
+/// Every exporter. They close in this order; the summary is the last one, because the others add to it.
+pub const EXPORTERS: &[Exporter] = &[csv::EXPORTER, hlog::EXPORTER, json::EXPORTER];
+
+/// The files of one run.
+pub struct Exports {
+    open: Vec<Box<dyn Export>>,
+    names: Vec<String>,
+}
+
+impl Exports {
+    /// Begins the files of `exporters`.
+    ///
+    /// # Errors
+    /// If the directory or a file cannot be made; no file stays then.
+    pub fn open(target: &Target<'_>, exporters: &[Exporter]) -> Result<Self, ExportError> {
+        fs::create_dir_all(target.dir)
+            .map_err(|source| ExportError::Directory { path: target.dir.to_owned(), source })?;
+        let open = exporters.iter().map(|exporter| (exporter.open)(target)).collect::<Result<_, _>>()?;
+        let names = exporters.iter().flat_map(|exporter| (exporter.files)(target)).collect();
+        Ok(Self { open, names })
+    }
+
+    /// The run is over: writes what is left and gives every file its name. Adds the names to the summary first.
+    ///
+    /// # Errors
+    /// The first one of the whole run; no file stays then.
+    pub fn finish(self, histograms: &Histograms, summary: &mut Summary) -> Result<Vec<PathBuf>, ExportError> {
+        summary.files.extend(self.names);
+        let mut staged = Vec::new();
+        for export in self.open {
+            staged.extend(export.close(histograms, summary)?);
+        }
+        Staged::place_all(staged)
+    }
+}
+
+impl core::fmt::Debug for Exports {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_tuple("Exports").field(&self.names).finish()
+    }
+}
+
+impl Sink for Exports {
+    fn cycle(&mut self, row: &CycleRow) {
+        self.open.iter_mut().for_each(|export| export.cycle(row));
+    }
+    fn slave(&mut self, row: &SlaveRow) {
+        self.open.iter_mut().for_each(|export| export.slave(row));
+    }
+    fn link(&mut self, row: &LinkRow) {
+        self.open.iter_mut().for_each(|export| export.link(row));
+    }
+    fn event(&mut self, row: &EventRow) {
+        self.open.iter_mut().for_each(|export| export.event(row));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::sample;
+    use std::collections::BTreeSet;
+
+    fn names(dir: &Path) -> BTreeSet<String> {
+        fs::read_dir(dir).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    }
+    fn fed(dir: &Path) -> Exports {
+        let layout = sample::layout();
+        let mut exports =
+            Exports::open(&Target { dir, layout: &layout, cycles: 3, rows: 100, tables: CsvTable::EVERY }, EXPORTERS)
+                .unwrap();
+        for cycle in 0..3 {
+            exports.event(&sample::event(cycle));
+            exports.cycle(&sample::cycle(cycle));
+            exports.slave(&sample::slave(cycle, 3));
+            exports.link(&sample::link(cycle));
+        }
+        exports
+    }
+    fn finish(exports: Exports) -> Result<Vec<PathBuf>, ExportError> {
+        let mut summary = Summary { files: Vec::new(), ..sample::run() };
+        exports.finish(&Histograms::new(&sample::layout()), &mut summary)
+    }
+
+    #[test]
+    fn a_run_leaves_the_files_that_its_exporters_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let (a, b) = (dir.path().join("new/a"), dir.path().join("b"));
+        let placed = finish(fed(&a)).unwrap();
+        finish(fed(&b)).unwrap();
+        let layout = sample::layout();
+        let target = Target { dir: &a, layout: &layout, cycles: 3, rows: 100, tables: CsvTable::EVERY };
+        let named: BTreeSet<_> = EXPORTERS.iter().flat_map(|exporter| (exporter.files)(&target)).collect();
+        assert_eq!(names(&a), named);
+        assert_eq!(placed.len(), named.len());
+        for name in named {
+            assert_eq!(fs::read(a.join(&name)).unwrap(), fs::read(b.join(&name)).unwrap(), "{name}");
+        }
+        let json: serde_json::Value = serde_json::from_slice(&fs::read(a.join("summary.json")).unwrap()).unwrap();
+        assert_eq!(json["files"].as_array().unwrap().len(), placed.len());
+        assert_eq!(json["thinning"][0]["rows_written"], 3);
+        finish(fed(&a)).expect("a second run takes the place of the first");
+    }
+
+    #[test]
+    fn every_file_of_this_folder_that_exports_has_a_line() {
+        let exporters: BTreeSet<_> = EXPORTERS.iter().map(|exporter| format!("{}.rs", exporter.name)).collect();
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/study/export");
+        let written: BTreeSet<_> = names(&folder)
+            .into_iter()
+            .filter(|name| fs::read_to_string(folder.join(name)).unwrap().contains("\npub const EXPORTER: Exporter"))
+            .collect();
+        assert_eq!(exporters, written);
+        assert_eq!(EXPORTERS.last().unwrap().name, "json", "the others add to the summary");
+    }
+
+    #[test]
+    fn a_failure_leaves_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        drop(fed(dir.path()));
+        assert!(names(dir.path()).is_empty(), "an interrupted run");
+        fs::create_dir_all(dir.path().join("summary.json/occupied")).unwrap();
+        let error = finish(fed(dir.path())).unwrap_err();
+        assert!(matches!(&error, ExportError::Place { path, .. } if path.ends_with("summary.json")), "{error}");
+        assert_eq!(names(dir.path()), BTreeSet::from(["summary.json".to_owned()]));
+        let file = dir.path().join("file");
+        fs::write(&file, "").unwrap();
+        let target = Target { dir: &file, layout: &sample::layout(), cycles: 3, rows: 100, tables: CsvTable::EVERY };
+        assert!(matches!(Exports::open(&target, EXPORTERS), Err(ExportError::Directory { .. })));
+    }
+}

@@ -1,0 +1,590 @@
+//! Metrics: the stream of observations becomes rows, one per cycle, slave and link.
+//!
+//! ```text
+//! CycleStart k          Subscribed, Used      Latch          CycleStart k+1
+//! ----|---------------------|-------------------|-----------------|----------->
+//!     t0(k)            data of k-1      nominal(k+1) - T_I       t0(k+1): rows of k leave
+//! ```
+//!
+//! Cycle k lasts from the master's `CycleStart` k to the next one. What slaves observe belongs to the cycle in which
+//! they observe it, so the master's `CycleStart` must come before what any slave makes of the same SYNCH.
+
+use super::count::Counts;
+use super::layout::Layout;
+use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
+use crate::observation::{ClockVerdict, Observation, Phase, PllState, SlaveState};
+use crate::sim::crystal::Crystal;
+use crate::sim::record::{Recorder, Stamp, Transmission};
+use crate::time::{Local, Span, Time};
+use crate::wire::Address;
+
+/// How fast the shafts of the slaves turn, for skew in counts.
+pub trait Shafts {
+    /// Speed of the shaft of `slave` at `at` [steps/s]; zero where there is none.
+    fn speed(&self, slave: Address, at: Time) -> f64;
+}
+impl<F: Fn(Address, Time) -> f64> Shafts for F {
+    fn speed(&self, slave: Address, at: Time) -> f64 {
+        self(slave, at)
+    }
+}
+
+/// Makes rows of a run and hands them to a sink.
+#[derive(Debug)]
+pub struct Metrics<S, V> {
+    layout: Layout,
+    shafts: V,
+    sink: S,
+    counts: Counts,
+    /// The cycle that is under way; `None` before the first.
+    open: Option<CycleRow>,
+    /// Where the latches of this cycle belong, per different T_I.
+    grid: Vec<Grid>,
+    slaves: Vec<Watch>,
+    links: Vec<LinkWatch>,
+}
+
+/// The nominal latch instant of all slaves with one T_I.
+#[derive(Debug)]
+struct Grid {
+    t_i: Span,
+    latch: Time,
+}
+
+/// What is known of one slave.
+#[derive(Debug)]
+struct Watch {
+    /// The row of this cycle; what it does not renew is carried over to the next.
+    row: SlaveRow,
+    /// Number of its T_I in [`Metrics::grid`].
+    grid: usize,
+    /// Latch offset in counts \[steps\].
+    offset_counts: f64,
+    /// The last locked latch of this cycle.
+    latched: Option<Time>,
+    /// The same of the cycle before: what the replies of this cycle carry (Model: D8).
+    travelling: Option<Time>,
+    /// First bit of the last reply to all stations in this cycle.
+    reply: Option<Time>,
+}
+
+/// What is known of one link in this cycle.
+#[derive(Debug)]
+struct LinkWatch {
+    publisher: usize,
+    row: LinkRow,
+    received: bool,
+}
+
+impl<S: Sink, V: Shafts> Metrics<S, V> {
+    /// Metrics of a network of `layout`, whose shafts turn as `shafts` says; rows go to `sink`.
+    ///
+    /// # Panics
+    /// If a link names a publisher that is no slave of the layout.
+    pub fn new(layout: Layout, shafts: V, sink: S) -> Self {
+        let mut grid = Vec::<Grid>::new();
+        let mut slaves = Vec::new();
+        for slave in layout.slaves() {
+            let number = grid.iter().position(|grid| grid.t_i == slave.t_i).unwrap_or_else(|| {
+                grid.push(Grid { t_i: slave.t_i, latch: Time::ZERO });
+                grid.len() - 1
+            });
+            slaves.push(Watch::new(slave.address, number));
+        }
+        let link = |&(publisher, subscriber): &(Address, Address)| LinkWatch {
+            publisher: layout.slave(publisher).expect("a publisher is a slave"),
+            row: LinkRow { cycle: 0, publisher, subscriber, wire: Span::ZERO, publish: Span::ZERO, age: None },
+            received: false,
+        };
+        let links = layout.links().iter().map(link).collect();
+        Self { counts: Counts::new(&layout), open: None, grid, slaves, links, layout, shafts, sink }
+    }
+
+    /// What was counted until now.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+    /// The sink.
+    pub fn sink(&self) -> &S {
+        &self.sink
+    }
+    /// The run is over at `end`: the rows of the cycle under way leave as far as they came.
+    pub fn finish(mut self, end: Time) -> (Counts, S) {
+        self.flush();
+        self.counts.finish(end);
+        (self.counts, self.sink)
+    }
+
+    /// Cycle `cycle` begins at `t0`, aimed at `nominal` by the master's `crystal`.
+    fn begin(&mut self, cycle: u64, t0: Time, nominal: Local, crystal: &Crystal) {
+        let before = self.open.filter(|before| before.cycle + 1 == cycle).map(|before| t0 - before.t0);
+        self.flush();
+        let next = nominal + self.layout.t_dp;
+        for grid in &mut self.grid {
+            grid.latch = crystal.to_true(next - grid.t_i);
+        }
+        self.open = Some(CycleRow {
+            cycle,
+            t0,
+            gc_jitter: t0 - crystal.to_true(nominal),
+            t_dp: before,
+            t_dp_deviation: before.map(|t_dp| t_dp - self.layout.t_dp),
+            t_dx: None,
+            latch_skew: None,
+            skew_counts: None,
+            retries: 0,
+            acyclic: None,
+            spare: None,
+        });
+    }
+
+    /// Sends the rows of the cycle under way off and makes everything ready for the next.
+    fn flush(&mut self) {
+        let Some(mut row) = self.open.take() else { return };
+        (row.latch_skew, row.skew_counts) = skew(&self.slaves);
+        if let Some(counts) = row.skew_counts {
+            let largest = &mut self.counts.network.skew_counts;
+            *largest = Some(largest.map_or(counts, |before| before.max(counts)));
+        }
+        self.sink.cycle(&row);
+        for slave in &mut self.slaves {
+            (slave.row.cycle, slave.row.t0) = (row.cycle, row.t0);
+            self.sink.slave(&slave.row);
+            slave.next_cycle();
+        }
+        for link in &mut self.links {
+            if link.received {
+                link.row.cycle = row.cycle;
+                self.sink.link(&link.row);
+            }
+            (link.received, link.row.age) = (false, None);
+        }
+    }
+
+    /// What the master observed.
+    fn master(&mut self, stamp: &Stamp<'_>, what: &Observation) {
+        self.counts.master(what, &self.layout);
+        if let Observation::CycleStart { cycle, nominal } = *what {
+            return self.begin(cycle, stamp.at, nominal, stamp.crystal);
+        }
+        let Some(open) = &mut self.open else { return };
+        match *what {
+            Observation::ExchangeDone { t_dx, .. } => open.t_dx = (t_dx > Span::ZERO).then_some(t_dx),
+            Observation::CycleSpare { acyclic, spare } => (open.acyclic, open.spare) = (Some(acyclic), Some(spare)),
+            Observation::Retry { .. } => open.retries += 1,
+            _ => {}
+        }
+    }
+
+    /// What the slave of number `index` observed.
+    fn slave(&mut self, index: usize, stamp: &Stamp<'_>, what: &Observation) {
+        self.counts.slaves[index].observe(stamp.at, self.counts.network.cycles, what);
+        match *what {
+            Observation::Latch { locked: true, .. } => self.latch(index, stamp.at),
+            Observation::Subscribed { publisher } => self.subscribed(publisher, stamp),
+            Observation::Used { publisher, .. } => self.used(publisher, stamp),
+            _ => {}
+        }
+        self.slaves[index].observe(what);
+    }
+
+    /// A locked latch. The first one of a cycle counts for the offset; a second one is possible only where the next
+    /// SYNCH is later than T_I.
+    fn latch(&mut self, index: usize, at: Time) {
+        let slave = &mut self.slaves[index];
+        slave.latched = Some(at);
+        if self.open.is_some() && slave.row.latch_offset.is_none() {
+            let offset = at - self.grid[slave.grid].latch;
+            slave.row.latch_offset = Some(offset);
+            slave.offset_counts = offset.as_s() * self.shafts.speed(slave.row.slave, at);
+        }
+    }
+
+    /// A subscriber took a reply over. The first one of a cycle counts; without a locked latch there is no latency.
+    fn subscribed(&mut self, publisher: Address, stamp: &Stamp<'_>) {
+        let Some(index) = self.layout.link(publisher, stamp.station) else { return };
+        let link = &mut self.links[index];
+        let Watch { travelling: Some(latch), reply: Some(reply), .. } = self.slaves[link.publisher] else { return };
+        if !link.received {
+            link.received = true;
+            link.row.wire = stamp.at - reply;
+            link.row.publish = stamp.at - latch;
+        }
+    }
+
+    /// A subscriber used a publisher's value at its T_O: data that it took over in this cycle, or it does not count.
+    fn used(&mut self, publisher: Address, stamp: &Stamp<'_>) {
+        let Some(index) = self.layout.link(publisher, stamp.station) else { return };
+        let link = &mut self.links[index];
+        let latch = self.slaves[link.publisher].travelling.filter(|_| link.received && link.row.age.is_none());
+        link.row.age = latch.map_or(link.row.age, |latch| Some(stamp.at - latch));
+    }
+}
+
+impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
+    fn telegram(&mut self, telegram: &Transmission<'_>) {
+        let [0x68, _, _, _, destination, ..] = telegram.octets else { return };
+        if destination & 0x7F == Address::BROADCAST.get()
+            && let Some(index) = self.layout.slave(telegram.sender)
+        {
+            self.slaves[index].reply = Some(telegram.start);
+        }
+    }
+
+    fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+        self.counts.station(what);
+        if stamp.station == self.layout.master {
+            self.master(&stamp, what);
+        } else if let Some(index) = self.layout.slave(stamp.station) {
+            self.slave(index, &stamp, what);
+        }
+        if what.is_event() {
+            let cycle = self.open.map_or(0, |open| open.cycle);
+            self.sink.event(&EventRow { at: stamp.at, cycle, station: stamp.station, what: *what });
+        }
+    }
+}
+
+/// Largest minus smallest latch offset over the locked slaves, as time and in counts (Model: D9).
+fn skew(slaves: &[Watch]) -> (Option<Span>, Option<f64>) {
+    let mut locked = 0;
+    let (mut low, mut high) = (Span::MAX, -Span::MAX);
+    let (mut low_counts, mut high_counts) = (f64::INFINITY, f64::NEG_INFINITY);
+    for slave in slaves {
+        let Some(offset) = slave.row.latch_offset else { continue };
+        locked += 1;
+        (low, high) = (low.min(offset), high.max(offset));
+        (low_counts, high_counts) = (low_counts.min(slave.offset_counts), high_counts.max(slave.offset_counts));
+    }
+    if locked < 2 { (None, None) } else { (Some(high - low), Some(high_counts - low_counts)) }
+}
+
+impl Watch {
+    fn new(slave: Address, grid: usize) -> Self {
+        let row = SlaveRow {
+            cycle: 0,
+            t0: Time::ZERO,
+            slave,
+            state: SlaveState::PowerOn,
+            phase: Phase::Configuration,
+            pll: PllState::Idle,
+            pll_error: None,
+            period: None,
+            window: None,
+            latch_offset: None,
+            mls: 0,
+            sls: 0,
+            life_counter: 0,
+            clock_counter: 0,
+            g1_zsw: 0,
+            xist1: 0,
+            xist2: 0,
+        };
+        Self { row, grid, offset_counts: 0.0, latched: None, travelling: None, reply: None }
+    }
+
+    fn next_cycle(&mut self) {
+        (self.row.pll_error, self.row.latch_offset, self.offset_counts) = (None, None, 0.0);
+        (self.travelling, self.latched, self.reply) = (self.latched, None, None);
+    }
+
+    fn observe(&mut self, what: &Observation) {
+        let row = &mut self.row;
+        match *what {
+            Observation::SlaveState { to, .. } => row.state = to,
+            Observation::Phase { to, .. } => {
+                row.phase = to;
+                // Nothing is compared at T_O without a clock, and the own sign of life stands at 0.
+                if to < Phase::MasterLife {
+                    (row.mls, row.sls) = (0, 0);
+                }
+                if to == Phase::Configuration {
+                    (row.life_counter, row.clock_counter) = (0, 0);
+                }
+            }
+            Observation::Pll { to, .. } => {
+                row.pll = to;
+                if matches!(to, PllState::Idle | PllState::Waiting) {
+                    (row.period, row.window) = (None, None);
+                }
+            }
+            Observation::Clock { verdict: ClockVerdict::Stray, .. } => {}
+            Observation::Clock { verdict, error, period, window, counter } => {
+                if matches!(verdict, ClockVerdict::Hit | ClockVerdict::Outside) {
+                    row.pll_error = Some(error);
+                }
+                (row.period, row.window, row.clock_counter) = (Some(period), Some(window), counter);
+            }
+            Observation::Latch { inputs, .. } => {
+                (row.g1_zsw, row.xist1, row.xist2) = (inputs.g1_zsw, inputs.xist1, inputs.xist2);
+            }
+            Observation::SetPoint { mls, sls, counter, .. } => {
+                (row.mls, row.sls, row.life_counter) = (mls, sls, counter);
+            }
+            _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observation::{Inputs, SlaveCause};
+    use crate::study::sample::{self, address};
+
+    /// Keeps every row.
+    #[derive(Default)]
+    struct Kept {
+        cycles: Vec<CycleRow>,
+        slaves: Vec<SlaveRow>,
+        links: Vec<LinkRow>,
+        events: Vec<EventRow>,
+        order: String,
+    }
+    impl Sink for Kept {
+        fn cycle(&mut self, row: &CycleRow) {
+            self.cycles.push(*row);
+            self.order.push('c');
+        }
+        fn slave(&mut self, row: &SlaveRow) {
+            self.slaves.push(*row);
+            self.order.push('s');
+        }
+        fn link(&mut self, row: &LinkRow) {
+            self.links.push(*row);
+            self.order.push('l');
+        }
+        fn event(&mut self, row: &EventRow) {
+            self.events.push(*row);
+            self.order.push('e');
+        }
+    }
+
+    type Speed = fn(Address, Time) -> f64;
+    /// A run of the sample's network that is told step by step, in true nanoseconds.
+    struct Told {
+        metrics: Metrics<Kept, Speed>,
+        master: Crystal,
+    }
+    fn at(ns: i64) -> Time {
+        Time::ZERO + Span::from_ns(ns)
+    }
+    impl Told {
+        /// The master is `ppb` fast and reads 1 s at true time zero; slave 3 turns at 10^6 steps/s, slave 5 back at 2 x 10^6.
+        fn new(ppb: i64) -> Self {
+            let speed: Speed = |slave, _| if slave.get() == 3 { 1e6 } else { -2e6 };
+            let master = Crystal::new(ppb, Local::ZERO + Span::from_s(1)).unwrap();
+            Self { metrics: Metrics::new(sample::layout(), speed, Kept::default()), master }
+        }
+        fn tell(&mut self, ns: i64, station: u8, what: Observation) {
+            let stamp = Stamp { at: at(ns), station: address(station), crystal: &self.master };
+            self.metrics.observe(stamp, &what);
+        }
+        fn cycle(&mut self, ns: i64, cycle: u64) {
+            let nominal = Local::ZERO + Span::from_s(1) + Span::from_ms(cycle as i64);
+            self.tell(ns, 1, Observation::CycleStart { cycle, nominal });
+        }
+        fn latch(&mut self, ns: i64, station: u8, locked: bool) {
+            let inputs = Inputs { zsw2: 0, g1_zsw: 0x2000, xist1: ns as u32, xist2: 7 };
+            self.tell(ns, station, Observation::Latch { locked, inputs });
+        }
+        fn reply(&mut self, ns: i64, station: u8, destination: u8) {
+            let octets = [0x68, 4, 4, 0x68, destination, station, 0x08, 0, 0, 0x16];
+            let telegram =
+                Transmission { start: at(ns), end: at(ns + 9_000), sender: address(station), octets: &octets };
+            self.metrics.telegram(&telegram);
+        }
+        fn over(self, ns: i64) -> (Counts, Kept) {
+            self.metrics.finish(at(ns))
+        }
+    }
+
+    #[test]
+    fn a_cycle_row_has_the_masters_numbers() {
+        let mut told = Told::new(0);
+        told.cycle(40, 0);
+        told.tell(449_040, 1, Observation::ExchangeDone { t_dx: Span::from_us(449), retries: 1 });
+        told.tell(449_040, 1, Observation::Retry { slave: address(5) });
+        let (acyclic, spare) = (Span::from_us(51), Span::from_us(488));
+        told.tell(500_000, 1, Observation::CycleSpare { acyclic, spare });
+        told.cycle(999_970, 1);
+        told.cycle(3_000_000, 3);
+        let (counts, kept) = told.over(3_500_000);
+        assert_eq!(kept.order, "ecsscsscss");
+        let [first, second, third] = kept.cycles[..] else { panic!("three cycles") };
+        assert_eq!(
+            (first.t0, first.gc_jitter, first.t_dp, first.t_dp_deviation),
+            (at(40), Span::from_ns(40), None, None)
+        );
+        assert_eq!((first.t_dx, first.retries), (Some(Span::from_us(449)), 1));
+        assert_eq!((first.acyclic, first.spare), (Some(acyclic), Some(spare)));
+        assert_eq!((second.gc_jitter, second.t_dp), (Span::from_ns(-30), Some(Span::from_ns(999_930))));
+        assert_eq!((second.t_dp_deviation, second.t_dx), (Some(Span::from_ns(-70)), None));
+        assert_eq!((third.cycle, third.gc_jitter, third.t_dp), (3, Span::ZERO, None), "cycle 2 is missing");
+        assert_eq!((counts.network.cycles, counts.network.retries, counts.slaves[1].retries), (3, 1, 1));
+        assert_eq!(counts.network.duration, Span::from_ns(3_500_000));
+    }
+
+    #[test]
+    fn latches_are_measured_from_the_nominal_grid() {
+        let mut told = Told::new(0);
+        told.cycle(500, 0); // late: the grid does not move
+        told.latch(875_030, 3, true);
+        told.latch(874_990, 5, true);
+        told.cycle(1_000_000, 1);
+        told.latch(1_875_012, 3, true);
+        told.latch(1_100_000, 5, false);
+        told.cycle(2_000_000, 2);
+        let (counts, kept) = told.over(2_500_000);
+        assert_eq!(kept.cycles[0].latch_skew, Some(Span::from_ns(40)));
+        // 30 ns x 10^6 and -10 ns x -2 x 10^6 steps/s: 0.03 and 0.02 steps.
+        assert!((kept.cycles[0].skew_counts.unwrap() - 0.01).abs() < 1e-12);
+        assert_eq!(counts.network.skew_counts, kept.cycles[0].skew_counts);
+        assert_eq!((kept.cycles[1].latch_skew, kept.cycles[1].skew_counts), (None, None), "one slave has no skew");
+        let offsets: Vec<_> = kept.slaves.iter().map(|row| (row.slave.get(), row.latch_offset)).collect();
+        let ns = |n| Some(Span::from_ns(n));
+        assert_eq!(offsets, [(3, ns(30)), (5, ns(-10)), (3, ns(12)), (5, None), (3, None), (5, None)]);
+        assert_eq!((kept.slaves[3].g1_zsw, kept.slaves[3].xist1, kept.slaves[3].xist2), (0x2000, 1_100_000, 7));
+        assert_eq!(kept.slaves[4].xist1, 1_875_012, "carried over");
+    }
+
+    #[test]
+    fn the_grid_is_counted_by_the_masters_crystal() {
+        let mut told = Told::new(100_000); // 100 ppm fast
+        told.cycle(0, 0);
+        told.latch(875_000, 3, true);
+        told.cycle(999_900, 1);
+        let (_, kept) = told.over(1_000_000);
+        // 875 µs of the master take 874 912.509 ns: 10 498 950.105 ticks, the first whole tick is 10 498 951.
+        assert_eq!(kept.slaves[0].latch_offset, Some(Span::from_ns(875_000) - Span::from_ticks(10_498_951)));
+        // Nominal t0(1) is at 999 900.01 ns: 11 998 800.12 ticks, 11 998 801.
+        assert_eq!(kept.cycles[1].gc_jitter, Span::from_ticks(-1));
+    }
+
+    #[test]
+    fn signs_of_life_end_with_the_clock_and_counters_with_data_exchange() {
+        let phase = |from, to| Observation::Phase { from, to };
+        let mut told = Told::new(0);
+        told.cycle(0, 0);
+        told.tell(500_000, 3, Observation::SetPoint { mls: 6, sls: 9, counter: 10, expected: false });
+        told.cycle(1_000_000, 1);
+        told.tell(1_000_020, 3, phase(Phase::Operation, Phase::Clock));
+        told.cycle(2_000_000, 2);
+        told.tell(2_100_000, 3, phase(Phase::Clock, Phase::Configuration));
+        let (_, kept) = told.over(3_000_000);
+        let rows = kept.slaves.iter().filter(|row| row.slave == address(3));
+        let values: Vec<_> = rows.map(|row| (row.mls, row.sls, row.life_counter)).collect();
+        assert_eq!(values, [(6, 9, 10), (0, 0, 10), (0, 0, 0)]);
+    }
+
+    #[test]
+    fn the_clock_of_a_slave_is_carried_over_and_its_error_is_not() {
+        let (period, window) = (Span::from_ms(1), Span::from_us(4));
+        let clock =
+            |verdict, ns, counter| Observation::Clock { verdict, error: Span::from_ns(ns), period, window, counter };
+        let mut told = Told::new(0);
+        told.cycle(0, 0);
+        told.tell(10, 3, Observation::Pll { from: PllState::Idle, to: PllState::Waiting });
+        told.tell(20, 3, clock(ClockVerdict::First, 0, 0));
+        told.tell(20, 3, Observation::Pll { from: PllState::Waiting, to: PllState::Narrowing });
+        told.cycle(1_000_000, 1);
+        told.tell(1_000_020, 3, clock(ClockVerdict::Hit, -12, 0));
+        told.cycle(2_000_000, 2);
+        told.tell(2_000_020, 3, clock(ClockVerdict::Outside, 9_000, 10));
+        told.cycle(3_000_000, 3);
+        told.tell(3_004_020, 3, clock(ClockVerdict::Missing, 0, 20));
+        told.tell(3_004_021, 3, clock(ClockVerdict::Stray, 5, 99));
+        told.cycle(4_000_000, 4);
+        told.tell(4_000_020, 3, Observation::Pll { from: PllState::Narrowing, to: PllState::Waiting });
+        let (counts, kept) = told.over(5_000_000);
+        let rows: Vec<_> = kept.slaves.iter().filter(|row| row.slave.get() == 3).collect();
+        let errors: Vec<_> = rows.iter().map(|row| row.pll_error.map(Span::as_ns)).collect();
+        assert_eq!(errors, [None, Some(-12.0), Some(9_000.0), None, None]);
+        assert_eq!(rows.iter().map(|row| row.clock_counter).collect::<Vec<_>>(), [0, 0, 10, 20, 20]);
+        let periods: Vec<_> = rows.iter().map(|row| (row.period, row.window, row.pll)).collect();
+        assert_eq!(periods[0], (Some(period), Some(window), PllState::Narrowing));
+        assert_eq!(periods[4], (None, None, PllState::Waiting));
+        assert_eq!(kept.slaves[1].period, None, "slave 5 saw nothing");
+        assert_eq!(counts.slaves[0].clock_failures, 2);
+        assert_eq!(kept.events.iter().map(|event| event.cycle).collect::<Vec<_>>(), [0, 0, 0, 2, 3, 3, 4]);
+    }
+
+    #[test]
+    fn latencies_follow_the_value_from_latch_to_use() {
+        let (subscribed, used) = (
+            Observation::Subscribed { publisher: address(3) },
+            Observation::Used { publisher: address(3), position: 0 },
+        );
+        let mut told = Told::new(0);
+        let mut cycle = |start: i64, number, latched| {
+            told.cycle(start, number);
+            told.reply(start + 90_000, 3, 127);
+            told.reply(start + 95_000, 3, 1); // an answer to the master alone
+            told.tell(start + 110_000, 5, subscribed);
+            told.tell(start + 130_000, 5, subscribed);
+            if number != 2 {
+                told.tell(start + 700_000, 5, used);
+            }
+            told.latch(start + 875_000, 3, latched);
+        };
+        cycle(0, 0, true); // nothing was latched before
+        cycle(1_000_000, 1, true);
+        cycle(2_000_000, 2, false); // a value, but not used
+        cycle(3_000_000, 3, true); // the value of a free-running latch
+        told.cycle(4_000_000, 4);
+        told.tell(4_700_000, 5, used); // an old value
+        let (_, kept) = told.over(5_000_000);
+        let row = |cycle, age| LinkRow {
+            cycle,
+            publisher: address(3),
+            subscriber: address(5),
+            wire: Span::from_us(20),
+            publish: Span::from_us(235),
+            age,
+        };
+        assert_eq!(kept.links, [row(1, Some(Span::from_us(825))), row(2, None)]);
+        assert!(kept.order.starts_with("csscssl"), "{}", kept.order);
+    }
+
+    #[test]
+    fn counts_are_by_slave_and_by_code() {
+        let mut told = Told::new(0);
+        let pll = |from, to| Observation::Pll { from, to };
+        let period = Span::from_ms(1);
+        let first =
+            Observation::Clock { verdict: ClockVerdict::First, error: Span::ZERO, period, window: period, counter: 0 };
+        told.cycle(0, 0);
+        let (from, to, cause) = (SlaveState::PowerOn, SlaveState::WaitPrm, SlaveCause::Initialised);
+        told.tell(100, 3, Observation::SlaveState { from, to, cause });
+        told.tell(1_000, 3, Observation::Phase { from: Phase::Configuration, to: Phase::Clock });
+        told.tell(2_000, 3, first);
+        for cycle in 1..=20 {
+            told.cycle(cycle * 1_000_000, cycle as u64);
+        }
+        told.tell(20_002_000, 3, pll(PllState::Settling, PllState::Locked));
+        told.tell(21_000_000, 3, pll(PllState::Locked, PllState::Waiting));
+        told.tell(22_000_000, 3, first);
+        told.tell(23_000_000, 3, pll(PllState::Settling, PllState::Locked));
+        for code in [0x0F04, 0x0F02, 0x0F04] {
+            told.tell(23_000_000, 3, Observation::Fault { code });
+        }
+        told.tell(23_000_000, 3, Observation::Acknowledged { code: 0x0F04 });
+        told.tell(23_000_000, 3, Observation::Collision { with: address(1) });
+        told.tell(23_000_000, 1, Observation::ClockLate { by: Span::from_us(1) });
+        told.tell(23_000_000, 1, Observation::NoAnswer { slave: address(5) });
+        told.tell(23_000_000, 1, Observation::NoAnswer { slave: address(77) });
+        told.tell(23_000_000, 1, Observation::TokenClaimed);
+        let (counts, kept) = told.over(25_000_000);
+        let (slave, other, network) = (&counts.slaves[0], &counts.slaves[1], &counts.network);
+        assert_eq!(slave.faults.iter().collect::<Vec<_>>(), [(&0x0F02, &1), (&0x0F04, &2)]);
+        assert_eq!((slave.fault_count(), slave.acknowledgements, slave.resynchronisations), (3, 1, 1));
+        assert_eq!(slave.lock, Some(super::super::count::Lock { cycles: 20, span: Span::from_ms(20) }));
+        assert_eq!((slave.state, slave.phase, slave.pll), (SlaveState::WaitPrm, Phase::Clock, PllState::Locked));
+        let (none, before, after) = (Span::ZERO, Span::from_us(1), Span::from_us(24_999));
+        assert_eq!(slave.phases, [before, after, none, none, none]);
+        assert_eq!((other.lock, other.phases[0], other.no_answers), (None, Span::from_ms(25), 1));
+        assert_eq!((network.late_clocks, network.no_answers), (1, 2));
+        assert_eq!((network.tokens_claimed, network.collisions), (1, 1));
+        assert_eq!(network.events, kept.events.len() as u64);
+    }
+}

@@ -1,0 +1,444 @@
+//! Quantities: numbers with units at the text border, read into exact integers.
+//!
+//! A text such as `125 us` is a decimal number and a unit. It is multiplied out in integers, never in floating point,
+//! so what a scenario says is what the run has. A quantity that is not a whole number of its smallest step is refused
+//! with its two neighbours; only angles, of which most have no exact value, are rounded, once.
+
+use crate::sim::motion::Angle;
+use crate::time::{BitRate, Span, Tbit};
+
+/// A unit: one of it is `ratio.0 / ratio.1` of the kind's smallest step.
+type Unit = (&'static str, (i128, i128));
+
+/// What a text can be read as.
+struct Kind {
+    /// With its article, for messages.
+    noun: &'static str,
+    /// A good text.
+    example: &'static str,
+    /// The smallest step in words.
+    step: &'static str,
+    /// The unit in which `n` steps can always be written.
+    unit_of_step: &'static str,
+    /// Accepted units; the first of several spellings is the one that messages show.
+    units: &'static [Unit],
+}
+
+/// Units of time without bit times, in ticks.
+const TIME_UNITS: &[Unit] = &[
+    ("ns", (12, 1)),
+    ("us", (12_000, 1)),
+    ("ms", (12_000_000, 1)),
+    ("s", (12_000_000_000, 1)),
+    ("min", (720_000_000_000, 1)),
+    ("h", (43_200_000_000_000, 1)),
+    ("tick", (1, 1)),
+];
+/// Other spellings of units: micro sign, Greek mu, plural.
+const SPELLINGS: &[(&str, &str)] = &[("\u{b5}s", "us"), ("\u{3bc}s", "us"), ("ticks", "tick")];
+
+const TIME: Kind =
+    Kind { noun: "a time", example: "125 us", step: "ticks of 1/12 ns", unit_of_step: "tick", units: TIME_UNITS };
+const BITS: Kind = Kind {
+    noun: "a number of bit times",
+    example: "300 tbit",
+    step: "bits",
+    unit_of_step: "tbit",
+    units: &[("tbit", (1, 1))],
+};
+const LENGTH: Kind = Kind {
+    noun: "a length",
+    example: "100 m",
+    step: "millimetres",
+    unit_of_step: "mm",
+    units: &[("mm", (1, 1)), ("cm", (10, 1)), ("m", (1_000, 1)), ("km", (1_000_000, 1))],
+};
+const DEVIATION: Kind = Kind {
+    noun: "a deviation of a frequency",
+    example: "50 ppm",
+    step: "ppb",
+    unit_of_step: "ppb",
+    units: &[("ppm", (1_000, 1)), ("ppb", (1, 1))],
+};
+const SPEED: Kind = Kind {
+    noun: "a speed",
+    example: "1500 rpm",
+    step: "millionths of an rpm",
+    unit_of_step: "urpm",
+    units: &[("rpm", (1_000_000, 1)), ("rev/s", (60_000_000, 1)), ("deg/s", (1_000_000, 6)), ("urpm", (1, 1))],
+};
+const ANGLE: Kind = Kind {
+    noun: "an angle",
+    example: "0.25 rev",
+    step: "2^-32 revolutions",
+    unit_of_step: "",
+    units: &[("rev", (Angle::UNITS_PER_REV as i128, 1)), ("deg", (Angle::UNITS_PER_REV as i128, 360))],
+};
+const RATE: Kind = Kind {
+    noun: "a bit rate",
+    example: "12 Mbit/s",
+    step: "hundredths of a bit/s",
+    unit_of_step: "",
+    units: &[("bit/s", (100, 1)), ("kbit/s", (100_000, 1)), ("Mbit/s", (100_000_000, 1))],
+};
+
+/// Why a text is not the quantity that it should be. Reads as a sentence.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum QuantityError {
+    /// There is no number in front.
+    #[error("\"{text}\" is not {noun}: write a number and a unit, such as \"{example}\"")]
+    NoNumber {
+        /// What was written.
+        text: String,
+        /// What it should be.
+        noun: &'static str,
+        /// A good text.
+        example: &'static str,
+    },
+    /// The unit is missing or not one of this quantity.
+    #[error("\"{text}\" has {found}; {noun} has one of the units {units}")]
+    Unit {
+        /// What was written.
+        text: String,
+        /// What stands where the unit should.
+        found: String,
+        /// What it should be.
+        noun: &'static str,
+        /// All units that fit.
+        units: String,
+    },
+    /// The quantity lies between two steps.
+    #[error("\"{text}\" is not a whole number of {step}; its neighbours are \"{below}\" and \"{above}\"")]
+    NotWhole {
+        /// What was written.
+        text: String,
+        /// The step.
+        step: &'static str,
+        /// The next smaller quantity that can be.
+        below: String,
+        /// The next larger one.
+        above: String,
+    },
+    /// The quantity does not fit.
+    #[error("\"{text}\" is beyond the range of {noun}, {min} to {max}")]
+    Range {
+        /// What was written.
+        text: String,
+        /// What it should be.
+        noun: &'static str,
+        /// The smallest.
+        min: String,
+        /// The largest.
+        max: String,
+    },
+    /// The bit rate is not one of the DP profile.
+    #[error("\"{text}\" is not a bit rate of PROFIBUS DP; the nearest is \"{nearest}\"")]
+    NoSuchRate {
+        /// What was written.
+        text: String,
+        /// The nearest one that exists.
+        nearest: BitRate,
+    },
+}
+
+/// Reads a time, `"125 us"`; with a bit rate also bit times, `"37 tbit"`.
+///
+/// # Errors
+/// No time, an unknown unit, no whole number of ticks, or more than 24 years.
+pub fn span(text: &str, rate: Option<BitRate>) -> Result<Span, QuantityError> {
+    let (number, unit) = Decimal::split(text, &TIME)?;
+    let ticks = match rate {
+        Some(rate) if unit == "tbit" => number.times((i128::from(rate.bit().ticks()), 1)),
+        Some(_) => number.times(ratio(text, unit, &TIME, &["tbit"])?),
+        None => number.times(ratio(text, unit, &TIME, &[])?),
+    };
+    let ticks = whole(text, &TIME, ticks)?;
+    i64::try_from(ticks).map(Span::from_ticks).map_err(|_| range(text, &TIME, "-24 years", "24 years"))
+}
+
+/// Reads bit times, `"300 tbit"`.
+///
+/// # Errors
+/// No number of bit times, a fraction of a bit, or a number that is negative or beyond 2^32 - 1.
+pub fn tbit(text: &str) -> Result<Tbit, QuantityError> {
+    u32::try_from(read(text, &BITS)?).map(Tbit).map_err(|_| range(text, &BITS, "0 tbit", "4294967295 tbit"))
+}
+
+/// Reads a length (mm), `"0.1 km"`.
+///
+/// # Errors
+/// No length, a fraction of a millimetre, or a length that is negative or beyond 1000 km.
+pub fn millimetres(text: &str) -> Result<u64, QuantityError> {
+    /// 1000 km.
+    const MAX: i128 = 1_000_000_000;
+    match read(text, &LENGTH)? {
+        mm @ 0..=MAX => Ok(mm as u64),
+        _ => Err(range(text, &LENGTH, "0 m", "1000 km")),
+    }
+}
+
+/// Reads a deviation of a frequency (10^-9), `"50 ppm"`.
+///
+/// # Errors
+/// No deviation, a fraction of a ppb, or more than ±1000 ppm.
+pub fn ppb(text: &str) -> Result<i64, QuantityError> {
+    /// 1000 ppm.
+    const MAX: u128 = 1_000_000;
+    match read(text, &DEVIATION)? {
+        ppb if ppb.unsigned_abs() <= MAX => Ok(ppb as i64),
+        _ => Err(range(text, &DEVIATION, "-1000 ppm", "1000 ppm")),
+    }
+}
+
+/// Reads a speed (10^-6 rpm), `"1500 rpm"`.
+///
+/// # Errors
+/// No speed, a fraction of 10^-6 rpm, or more than an `i64` holds.
+pub fn micro_rpm(text: &str) -> Result<i64, QuantityError> {
+    i64::try_from(read(text, &SPEED)?).map_err(|_| range(text, &SPEED, "-9e12 rpm", "9e12 rpm"))
+}
+
+/// Reads an angle, `"0.25 rev"` or `"90 deg"`, rounded to the nearest 2^-32 revolution, halves up.
+///
+/// # Errors
+/// No angle, or 2^31 revolutions and more.
+pub fn angle(text: &str) -> Result<Angle, QuantityError> {
+    let (number, unit) = Decimal::split(text, &ANGLE)?;
+    let rounded = number.times(ratio(text, unit, &ANGLE, &[])?).map(|(above, below)| {
+        // Both are far below 2^126: twice the numerator does not overflow.
+        (2 * above + below).div_euclid(2 * below)
+    });
+    rounded
+        .and_then(|units| i64::try_from(units).ok())
+        .map(Angle::from_units)
+        .ok_or_else(|| range(text, &ANGLE, "-2147483648 rev", "2147483647 rev"))
+}
+
+/// Reads a bit rate, `"12 Mbit/s"`.
+///
+/// # Errors
+/// No bit rate, or none of the DP profile.
+pub fn bit_rate(text: &str) -> Result<BitRate, QuantityError> {
+    let centi_bps = read(text, &RATE)?;
+    let of = |rate: BitRate| read(rate.text(), &RATE).unwrap_or_default();
+    let nearest = BitRate::ALL.iter().copied().min_by_key(|&rate| of(rate).abs_diff(centi_bps));
+    match nearest {
+        Some(rate) if of(rate) == centi_bps => Ok(rate),
+        _ => Err(QuantityError::NoSuchRate { text: text.into(), nearest: nearest.unwrap_or(BitRate::M12) }),
+    }
+}
+
+/// A decimal number as it was written: `digits` / 10^`places`.
+#[derive(Clone, Copy)]
+struct Decimal {
+    digits: i128,
+    places: u32,
+}
+
+impl Decimal {
+    /// Most digits of a number; more than any quantity needs, and few enough that no product overflows unseen.
+    const MAX_DIGITS: usize = 24;
+
+    /// Splits `text` into its number and its unit.
+    fn split<'a>(text: &'a str, kind: &Kind) -> Result<(Self, &'a str), QuantityError> {
+        let trimmed = text.trim();
+        let is_number = |c: char| c.is_ascii_digit() || matches!(c, '.' | '_' | '+' | '-');
+        let end = trimmed.find(|c| !is_number(c)).unwrap_or(trimmed.len());
+        let (number, unit) = trimmed.split_at(end);
+        let none = || QuantityError::NoNumber { text: text.into(), noun: kind.noun, example: kind.example };
+        Ok((Self::parse(number).ok_or_else(none)?, unit.trim()))
+    }
+    /// Reads `[+-]digits[.digits]` with underscores between digits.
+    fn parse(number: &str) -> Option<Self> {
+        let unsigned = number.strip_prefix(['+', '-']).unwrap_or(number);
+        let (whole, fraction) = unsigned.split_once('.').unwrap_or((unsigned, "0"));
+        let good = |part: &str| {
+            part.bytes().all(|b| b.is_ascii_digit() || b == b'_')
+                && part.starts_with(|c: char| c.is_ascii_digit())
+                && part.ends_with(|c: char| c.is_ascii_digit())
+        };
+        if !good(whole) || !good(fraction) {
+            return None;
+        }
+        let digits: String = [whole, fraction.trim_end_matches('0')].concat().replace('_', "");
+        let places = fraction.trim_end_matches('0').replace('_', "").len() as u32;
+        let digits = digits.trim_start_matches('0');
+        if digits.len() > Self::MAX_DIGITS || places as usize > Self::MAX_DIGITS {
+            return None;
+        }
+        let magnitude: i128 = if digits.is_empty() { 0 } else { digits.parse().ok()? };
+        Some(Self { digits: if number.starts_with('-') { -magnitude } else { magnitude }, places })
+    }
+    /// The product with `numerator` / `denominator` as a fraction; `None` if it is beyond all ranges.
+    fn times(self, (numerator, denominator): (i128, i128)) -> Option<(i128, i128)> {
+        Some((self.digits.checked_mul(numerator)?, 10i128.pow(self.places).checked_mul(denominator)?))
+            .filter(|(above, _)| above.unsigned_abs() < 1 << 125)
+    }
+}
+
+/// Reads `text` as whole steps of `kind`.
+fn read(text: &str, kind: &Kind) -> Result<i128, QuantityError> {
+    let (number, unit) = Decimal::split(text, kind)?;
+    whole(text, kind, number.times(ratio(text, unit, kind, &[])?))
+}
+
+/// What one of `unit` is worth; `more` are further units that the caller knows, for the message.
+fn ratio(text: &str, unit: &str, kind: &Kind, more: &[&str]) -> Result<(i128, i128), QuantityError> {
+    let unit = SPELLINGS.iter().find(|(other, _)| *other == unit).map_or(unit, |&(_, usual)| usual);
+    kind.units.iter().find(|(name, _)| *name == unit).map(|&(_, ratio)| ratio).ok_or_else(|| {
+        let names: Vec<_> = kind.units.iter().map(|&(name, _)| name).chain(more.iter().copied()).collect();
+        QuantityError::Unit {
+            text: text.into(),
+            found: if unit.is_empty() { "no unit".into() } else { format!("the unit \"{unit}\"") },
+            noun: kind.noun,
+            units: names.join(", "),
+        }
+    })
+}
+
+/// The whole number that `fraction` is.
+fn whole(text: &str, kind: &Kind, fraction: Option<(i128, i128)>) -> Result<i128, QuantityError> {
+    let Some((above, below)) = fraction else {
+        return Ok(if text.trim().starts_with('-') { i128::MIN } else { i128::MAX });
+    };
+    let floor = above.div_euclid(below);
+    if above.rem_euclid(below) == 0 {
+        return Ok(floor);
+    }
+    let show = |steps: i128| format!("{steps} {}", kind.unit_of_step);
+    Err(QuantityError::NotWhole { text: text.into(), step: kind.step, below: show(floor), above: show(floor + 1) })
+}
+
+/// The error for a quantity that does not fit.
+fn range(text: &str, kind: &Kind, min: &str, max: &str) -> QuantityError {
+    QuantityError::Range { text: text.into(), noun: kind.noun, min: min.into(), max: max.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn message<T: std::fmt::Debug>(result: Result<T, QuantityError>) -> String {
+        result.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn times_are_exact() {
+        for (text, span_) in [
+            ("125 us", Span::from_us(125)),
+            ("125us", Span::from_us(125)),
+            ("125 \u{b5}s", Span::from_us(125)),
+            ("125 \u{3bc}s", Span::from_us(125)),
+            ("2 ms", Span::from_ms(2)),
+            ("0.5 ns", Span::from_ticks(6)),
+            ("0.25 ns", Span::from_ticks(3)),
+            ("1 tick", Span::from_ticks(1)),
+            ("-7 ticks", Span::from_ticks(-7)),
+            ("+1.500 s", Span::from_ms(1_500)),
+            ("  10   s ", Span::from_s(10)),
+            ("1_000 ns", Span::from_us(1)),
+            ("1.5 h", Span::from_s(5_400)),
+            ("37 tbit", BitRate::M1_5.span(Tbit(37))),
+        ] {
+            assert_eq!(span(text, Some(BitRate::M1_5)), Ok(span_), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_time_between_two_ticks_is_refused_with_its_neighbours() {
+        assert_eq!(
+            message(span("0.1 ns", None)),
+            "\"0.1 ns\" is not a whole number of ticks of 1/12 ns; its neighbours are \"1 tick\" and \"2 tick\""
+        );
+        assert_eq!(
+            message(span("-0.1 ns", None)),
+            "\"-0.1 ns\" is not a whole number of ticks of 1/12 ns; its neighbours are \"-2 tick\" and \"-1 tick\""
+        );
+        assert_eq!(
+            message(tbit("3.5 tbit")),
+            "\"3.5 tbit\" is not a whole number of bits; its neighbours are \"3 tbit\" and \"4 tbit\""
+        );
+    }
+
+    #[test]
+    fn a_wrong_unit_is_answered_with_the_right_ones() {
+        assert_eq!(
+            message(span("10 m", None)),
+            "\"10 m\" has the unit \"m\"; a time has one of the units ns, us, ms, s, min, h, tick"
+        );
+        assert_eq!(
+            message(span("10", Some(BitRate::M12))),
+            "\"10\" has no unit; a time has one of the units ns, us, ms, s, min, h, tick, tbit"
+        );
+        assert_eq!(
+            message(span("soon", None)),
+            "\"soon\" is not a time: write a number and a unit, such as \"125 us\""
+        );
+        assert_eq!(
+            message(micro_rpm("3 m/s")),
+            "\"3 m/s\" has the unit \"m/s\"; a speed has one of the units rpm, rev/s, deg/s, urpm"
+        );
+    }
+
+    #[test]
+    fn what_is_too_large_is_refused() {
+        assert_eq!(
+            message(span("300000 h", None)),
+            "\"300000 h\" is beyond the range of a time, -24 years to 24 years"
+        );
+        for text in ["999999999999999999999999 h", "-999999999999999999999999 h"] {
+            assert!(matches!(span(text, None), Err(QuantityError::Range { .. })), "{text}");
+        }
+        assert!(matches!(span(&"9".repeat(200), None), Err(QuantityError::NoNumber { .. })));
+        assert!(matches!(tbit("-1 tbit"), Err(QuantityError::Range { .. })));
+        assert!(matches!(tbit("4294967296 tbit"), Err(QuantityError::Range { .. })));
+        assert!(matches!(millimetres("-1 m"), Err(QuantityError::Range { .. })));
+        assert!(matches!(ppb("1000.001 ppm"), Err(QuantityError::Range { .. })));
+        assert!(matches!(angle("2147483648 rev"), Err(QuantityError::Range { .. })));
+    }
+
+    #[test]
+    fn other_quantities() {
+        assert_eq!(millimetres("0.1 km"), Ok(100_000));
+        assert_eq!(millimetres("12.5 m"), Ok(12_500));
+        assert_eq!(ppb("-50 ppm"), Ok(-50_000));
+        assert_eq!(micro_rpm("1500 rpm"), Ok(1_500_000_000));
+        assert_eq!(micro_rpm("90 deg/s"), Ok(15_000_000));
+        assert_eq!(angle("0.25 rev"), Ok(Angle::from_units(1 << 30)));
+        assert_eq!(angle("90 deg"), Ok(Angle::from_units(1 << 30)));
+        assert_eq!(angle("-1 rev"), Ok(Angle::from_revs(-1)));
+        assert_eq!(angle("0.1 rev"), Ok(Angle::from_units(429_496_730)));
+    }
+
+    #[test]
+    fn every_bit_rate_is_read_as_it_is_shown() {
+        for &rate in BitRate::ALL {
+            assert_eq!(bit_rate(rate.text()), Ok(rate));
+        }
+        assert_eq!(bit_rate("12000 kbit/s"), Ok(BitRate::M12));
+        assert_eq!(
+            message(bit_rate("11 Mbit/s")),
+            "\"11 Mbit/s\" is not a bit rate of PROFIBUS DP; the nearest is \"12 Mbit/s\""
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn what_a_span_shows_is_read_again(us in -1_000_000_000i64..1_000_000_000) {
+            let long = Span::from_us(us);
+            let short = Span::from_ns(us);
+            // Three decimals of the unit shown are exact as long as there are no more than six digits.
+            for whole in [Span::from_us(us % 1_000_000), Span::from_ns(us % 1_000_000)] {
+                prop_assert_eq!(span(&whole.to_string(), None), Ok(whole));
+            }
+            prop_assert_eq!(span(&format!("{us} us"), None), Ok(long));
+            prop_assert_eq!(span(&format!("{us} ns"), None), Ok(short));
+        }
+        #[test]
+        fn no_text_panics(text in "[-+.0-9_ a-zµ/]{0,40}") {
+            let _ = (span(&text, Some(BitRate::M12)), tbit(&text), millimetres(&text), ppb(&text));
+            let _ = (micro_rpm(&text), angle(&text), bit_rate(&text));
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! Report: the summary of a run as text that fits a screen.
+
+use super::summary::{Distribution, LinkSummary, SlaveSummary, Summary};
+use crate::time::Span;
+
+/// Slaves that are shown; of more, the worst.
+pub const SLAVES: usize = 16;
+/// Links that are shown; of more, the slowest.
+pub const LINKS: usize = 8;
+
+/// The summary as text; `dir` is where its files are, none if there are none.
+pub fn render(summary: &Summary, dir: Option<&str>) -> String {
+    let mut lines = Vec::new();
+    network(summary, &mut lines);
+    slaves(summary, &mut lines);
+    spread(summary, &mut lines);
+    links(summary, &mut lines);
+    fingerprint(summary, &mut lines);
+    files(summary, dir, &mut lines);
+    lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
+}
+
+fn network(summary: &Summary, lines: &mut Vec<String>) {
+    let (network, timing, counts) = (&summary.network, &summary.timing, &summary.counts);
+    lines.push(format!(
+        "{}: master {}, {}, {}, {}, {} cycles in {}, seed {}",
+        network.scenario,
+        network.master,
+        number(network.slaves, "slave"),
+        number(network.links, "link"),
+        network.bit_rate,
+        network.cycles,
+        network.duration,
+        network.seed
+    ));
+    lines.push(format!(
+        "T_DP {}   T_DX {}, leaves {}   T_I {}   T_O {}   spare {}",
+        timing.t_dp,
+        at("up to", timing.t_dx_max),
+        span(timing.left),
+        range(timing.t_i_min, timing.t_i_max),
+        range(timing.t_o_min, timing.t_o_max),
+        at("from", timing.spare_min),
+    ));
+    let happened = [
+        (counts.faults, "fault"),
+        (counts.retries, "retry"),
+        (counts.no_answers, "missing answer"),
+        (counts.late_clocks, "late clock"),
+        (counts.collisions, "collision"),
+        (counts.disturbed, "disturbed telegram"),
+    ];
+    let text: Vec<_> = happened.iter().filter(|(count, _)| *count > 0).map(|&(n, what)| number(n, what)).collect();
+    lines.push(if text.is_empty() { "nothing went wrong on the bus".to_owned() } else { text.join(", ") });
+}
+
+fn slaves(summary: &Summary, lines: &mut Vec<String>) {
+    let mut shown: Vec<_> = summary.slaves.iter().collect();
+    let more = shown.len().saturating_sub(SLAVES);
+    if more > 0 {
+        // Stable, so that equally bad slaves stay in address order.
+        shown.sort_by_key(|slave| std::cmp::Reverse(badness(slave)));
+        shown.truncate(SLAVES);
+        shown.sort_by_key(|slave| slave.address);
+    }
+    let header =
+        ["slave", "device", "state", "phase", "lock", "PLL error p99", "max", "latch offset mean", "max", "faults"];
+    let rows = shown.iter().map(|slave| slave_cells(slave)).collect::<Vec<_>>();
+    lines.push(String::new());
+    lines.extend(aligned(&header, &[1, 2, 3, 9], &rows));
+    if more > 0 {
+        lines.push(format!("the {SLAVES} worst of {} slaves; {more} more are no worse", summary.slaves.len()));
+    }
+}
+
+/// What makes a slave worse than another: faults, then not being in operation, then its latch offset.
+fn badness(slave: &SlaveSummary) -> (u64, bool, Span) {
+    let operating = slave.phase == crate::observation::Phase::Operation.text();
+    let offset = slave.distribution("latch_offset").and_then(|offset| offset.farthest).map_or(Span::ZERO, Span::abs);
+    (slave.fault_count(), !operating, offset)
+}
+
+fn slave_cells(slave: &SlaveSummary) -> Vec<String> {
+    let of = |name, value: fn(&Distribution) -> Option<Span>| span(slave.distribution(name).and_then(value));
+    let faults: Vec<_> = slave.faults.iter().map(|(code, count)| format!("{count} x {code}")).collect();
+    vec![
+        slave.address.to_string(),
+        slave.device.clone(),
+        slave.state.to_owned(),
+        slave.phase.to_owned(),
+        slave.lock_cycles.map_or_else(|| "-".to_owned(), |cycles| format!("{cycles} cycles")),
+        of("pll_error", |error| error.magnitude_p99),
+        of("pll_error", |error| error.farthest),
+        of("latch_offset", |offset| offset.mean),
+        of("latch_offset", |offset| offset.farthest),
+        if faults.is_empty() { "-".to_owned() } else { faults.join(", ") },
+    ]
+}
+
+fn spread(summary: &Summary, lines: &mut Vec<String>) {
+    let Some(skew) = summary.distribution("latch_skew").filter(|skew| skew.count > 0) else { return };
+    let steps = summary.counts.skew_max_steps.map_or_else(String::new, |steps| format!(", {steps:.3} steps"));
+    lines.push(String::new());
+    lines.push(format!(
+        "latch skew: p50 {}, p90 {}, p99 {}, p99.9 {}, max {}{steps}",
+        span(skew.p50),
+        span(skew.p90),
+        span(skew.p99),
+        span(skew.p99_9),
+        span(skew.max),
+    ));
+}
+
+fn links(summary: &Summary, lines: &mut Vec<String>) {
+    if summary.links.is_empty() {
+        return;
+    }
+    let mut shown: Vec<_> = summary.links.iter().collect();
+    let more = shown.len().saturating_sub(LINKS);
+    if more > 0 {
+        let slowest = |link: &&LinkSummary| link.distribution("publish").and_then(|publish| publish.p99);
+        shown.sort_by_key(|link| std::cmp::Reverse(slowest(link)));
+        shown.truncate(LINKS);
+        shown.sort_by_key(|link| (link.publisher, link.subscriber));
+    }
+    let header = ["publish latency", "p50", "p90", "p99", "p99.9", "max", "age at use max"];
+    let rows: Vec<_> = shown.iter().map(|link| link_cells(link)).collect();
+    lines.push(String::new());
+    lines.extend(aligned(&header, &[], &rows));
+    if more > 0 {
+        lines.push(format!("the {LINKS} slowest of {} links; {more} more are no slower", summary.links.len()));
+    }
+}
+
+fn link_cells(link: &LinkSummary) -> Vec<String> {
+    let publish = |value: fn(&Distribution) -> Option<Span>| span(link.distribution("publish").and_then(value));
+    vec![
+        format!("{} -> {}", link.publisher, link.subscriber),
+        publish(|latency| latency.p50),
+        publish(|latency| latency.p90),
+        publish(|latency| latency.p99),
+        publish(|latency| latency.p99_9),
+        publish(|latency| latency.max),
+        span(link.distribution("age").and_then(|age| age.max)),
+    ]
+}
+
+fn fingerprint(summary: &Summary, lines: &mut Vec<String>) {
+    if !summary.fingerprint.is_empty() {
+        let parts: Vec<_> = summary.fingerprint.iter().map(|(name, text)| format!("{name} {text}")).collect();
+        lines.push(String::new());
+        lines.push(format!("fingerprint: {}", parts.join("  ")));
+    }
+}
+
+fn files(summary: &Summary, dir: Option<&str>, lines: &mut Vec<String>) {
+    let thinned = summary.thinning.iter().filter(|table| table.rows_left_out > 0);
+    lines.extend(thinned.map(ToString::to_string));
+    if summary.events_left_out > 0 {
+        lines.push(format!("events.csv: the last {} events are left out", summary.events_left_out));
+    }
+    if let Some(dir) = dir {
+        lines.push(format!("{} in {dir}", number(summary.files.len(), "file")));
+    }
+}
+
+/// Lines of a table whose columns are as wide as their widest cell; the columns of `left` are flush left, the others
+/// flush right.
+fn aligned(header: &[&str], left: &[usize], rows: &[Vec<String>]) -> Vec<String> {
+    let header = header.iter().map(|&title| title.to_owned()).collect::<Vec<_>>();
+    let all = || std::iter::once(&header).chain(rows);
+    let width = |column: usize| all().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<_> = (0..header.len()).map(width).collect();
+    let cell = |(column, text): (usize, &String)| {
+        let width = widths[column];
+        if left.contains(&column) { format!("{text:<width$}") } else { format!("{text:>width$}") }
+    };
+    all().map(|row| row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ")).collect()
+}
+
+fn span(span: Option<Span>) -> String {
+    span.map_or_else(|| "-".to_owned(), |span| span.to_string())
+}
+fn at(word: &str, limit: Option<Span>) -> String {
+    limit.map_or_else(|| "-".to_owned(), |limit| format!("{word} {limit}"))
+}
+fn range(low: Option<Span>, high: Option<Span>) -> String {
+    if low == high { span(low) } else { format!("{} to {}", span(low), span(high)) }
+}
+/// `1 slave`, `2 slaves`, `3 retries`.
+fn number(count: impl TryInto<u64>, noun: &str) -> String {
+    let count = count.try_into().unwrap_or(u64::MAX);
+    match noun.strip_suffix('y') {
+        _ if count == 1 => format!("1 {noun}"),
+        Some(stem) => format!("{count} {stem}ies"),
+        None => format!("{count} {noun}s"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::sample;
+
+    /// A run of `slaves` slaves, of which 3 + 10 n has n faults, and as many links.
+    fn summary(slaves: u8) -> Summary {
+        let mut summary = sample::run();
+        let (slave, link) = (summary.slaves[1].clone(), summary.links[0].clone());
+        summary.slaves =
+            (3..3 + slaves).map(|address| SlaveSummary { address, faults: Vec::new(), ..slave.clone() }).collect();
+        summary.links = (3..3 + slaves).map(|publisher| LinkSummary { publisher, ..link.clone() }).collect();
+        for (number, slave) in summary.slaves.iter_mut().step_by(10).enumerate() {
+            slave.faults = vec![("0F04".to_owned(), number as u64)];
+        }
+        summary
+    }
+
+    #[test]
+    fn a_run_fits_a_screen() {
+        let text = render(&sample::run(), Some("out/sample"));
+        let expected = "\
+sample: master 1, 2 slaves, 1 link, 12 Mbit/s, 3 cycles in 10 s, seed 1
+T_DP 1 ms   T_DX up to 449 us, leaves 551 us   T_I 125 us   T_O 625 us   spare from 300 us
+1 fault, 2 retries
+
+slave  device   state      phase                 lock  PLL error p99     max  latch offset mean    max  faults
+    3  encoder  POWER_ON   1 configuration          -              -       -                  -      -  -
+    5  encoder  DATA_EXCH  5 operation      20 cycles          42 ns  -42 ns              45 ns  45 ns  1 x 0F04
+
+latch skew: p50 90 ns, p90 90 ns, p99 90 ns, p99.9 90 ns, max 90 ns, 0.250 steps
+
+publish latency     p50     p90     p99   p99.9     max  age at use max
+         3 -> 5  400 us  400 us  400 us  400 us  400 us          750 us
+
+fingerprint: wire 0123456789abcdef
+2 files in out/sample
+";
+        assert_eq!(text, expected, "\n{text}");
+    }
+
+    #[test]
+    fn eight_slaves_and_links_fit_forty_lines() {
+        let text = render(&summary(8), Some("out/sample"));
+        assert!(text.lines().count() <= 40, "{text}");
+    }
+
+    #[test]
+    fn of_many_slaves_the_worst_are_shown_and_the_rest_is_counted() {
+        let text = render(&summary(100), None);
+        assert!(text.lines().count() <= 45, "{text}");
+        assert!(text.contains("the 16 worst of 100 slaves; 84 more are no worse\n"), "{text}");
+        assert!(text.contains("the 8 slowest of 100 links; 92 more are no slower\n"), "{text}");
+        for (number, slave) in (13..=93).step_by(10).enumerate() {
+            let line = text
+                .lines()
+                .find(|line| line.starts_with(&format!("{slave:>5}  ")))
+                .unwrap_or_else(|| panic!("no {slave} in\n{text}"));
+            assert!(line.ends_with(&format!("{} x 0F04", number + 1)), "{line}");
+        }
+    }
+
+    #[test]
+    fn what_a_table_left_out_is_said() {
+        let mut summary = sample::run();
+        summary.thinning[0].rows_left_out = 7;
+        summary.events_left_out = 9;
+        let text = render(&summary, None);
+        assert!(text.contains("\ncycles.csv: cycles 0 to 511, one in 1,"), "{text}");
+        assert!(text.ends_with("; 7 rows left out\nevents.csv: the last 9 events are left out\n"), "{text}");
+    }
+}

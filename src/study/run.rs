@@ -1,0 +1,253 @@
+//! Run: one scenario from start to end, with everything that reads it, and the files it leaves.
+
+use std::path::{Path, PathBuf};
+
+use super::build;
+use super::export::{EXPORTERS, ExportError, Exports, Target};
+use super::histogram::{Histogram, Histograms, Quantity, Subject};
+use super::layout::{Layout, SlaveLayout};
+use super::metric::{Metrics, Shafts};
+use super::plot::{BusCycle, Distribution, Distributions, LinkLatencies, PlotError, PlotMeta, Plots};
+use super::row::Sink;
+use super::scenario::{Extent, Scenario};
+use super::summary::{Facts, SlaveFacts, Summary};
+use crate::device::node::Node;
+use crate::sim::fingerprint::{Digest, Fingerprint, Fingerprints};
+use crate::sim::motion::Shaft;
+use crate::sim::network::{Network, NetworkEvent, Until};
+use crate::sim::queue::Queue;
+use crate::time::{Span, Time};
+use crate::wire::Address;
+
+/// Events between two looks at the progress.
+const STRIDE: u64 = 50_000;
+/// Bins of a histogram in a picture.
+const BINS: usize = 120;
+
+/// How far a run has come.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Progress {
+    /// Simulated time.
+    pub simulated: Span,
+    /// Cycles begun.
+    pub cycles: u64,
+}
+
+/// What a run left.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Figures of the run.
+    pub summary: Summary,
+    /// The network's fingerprint.
+    pub fingerprint: Fingerprint,
+    /// Each station's.
+    pub stations: Vec<(Address, Fingerprint)>,
+    /// Hash of every figure of the summary.
+    pub statistics: u64,
+    /// Where the files are, if there are any.
+    pub dir: Option<PathBuf>,
+}
+
+/// Why a run ended without result.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A table, log or summary could not be written.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+    /// A picture could not be written.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// The summary has no text form.
+    #[error("the summary cannot be written as JSON: {0}")]
+    Summary(#[from] serde_json::Error),
+}
+
+/// Speeds of the shafts of a scenario.
+struct Speeds(Vec<Option<(Shaft, f64)>>);
+
+impl Speeds {
+    fn of(scenario: &Scenario) -> Self {
+        let mut speeds = vec![None; 128];
+        for slave in &scenario.slaves {
+            let counts = slave.scaling.map_or(slave.device.steps_per_rev, |scaling| scaling.units_per_rev);
+            let shaft = Shaft::new(&slave.motion).expect("a checked motion");
+            speeds[usize::from(slave.address.get())] = Some((shaft, f64::from(counts)));
+        }
+        Self(speeds)
+    }
+}
+impl Shafts for Speeds {
+    fn speed(&self, slave: Address, at: Time) -> f64 {
+        self.0[usize::from(slave.get())].as_ref().map_or(0.0, |(shaft, counts)| shaft.speed(at) * counts)
+    }
+}
+
+/// Everything that takes rows.
+struct Sinks {
+    histograms: Histograms,
+    exports: Option<Exports>,
+    plots: Option<Plots>,
+}
+impl Sink for Sinks {
+    fn cycle(&mut self, row: &super::row::CycleRow) {
+        self.histograms.cycle(row);
+        self.exports.cycle(row);
+        self.plots.cycle(row);
+    }
+    fn slave(&mut self, row: &super::row::SlaveRow) {
+        self.histograms.slave(row);
+        self.exports.slave(row);
+        self.plots.slave(row);
+    }
+    fn link(&mut self, row: &super::row::LinkRow) {
+        self.histograms.link(row);
+        self.exports.link(row);
+        self.plots.link(row);
+    }
+    fn event(&mut self, row: &super::row::EventRow) {
+        self.histograms.event(row);
+        self.exports.event(row);
+        self.plots.event(row);
+    }
+}
+
+/// Runs `scenario`. Files go to `out/<scenario>/` if `out` is given and the scenario wants any. `watch` is told the
+/// progress now and then; it cannot change the run.
+///
+/// # Errors
+/// A file that cannot be written. None is left half-written.
+pub fn run<Q: Queue<NetworkEvent>>(
+    scenario: &Scenario,
+    out: Option<&Path>,
+    mut watch: impl FnMut(Progress),
+) -> Result<Outcome, RunError> {
+    let dir = out.filter(|_| scenario.record.files).map(|out| out.join(&scenario.name));
+    let layout = layout(scenario);
+    let exports = dir.as_deref().map(|dir| {
+        let (cycles, rows) = (cycles(scenario), scenario.record.rows);
+        Exports::open(&Target { dir, layout: &layout, cycles, rows, tables: &scenario.record.tables }, EXPORTERS)
+    });
+    let draws = dir.is_some() && scenario.record.plots;
+    let plots = draws.then(|| Plots::new(meta(scenario, &layout)));
+    let sinks = Sinks { histograms: Histograms::new(&layout), exports: exports.transpose()?, plots };
+    let metrics = Metrics::new(layout, Speeds::of(scenario), sinks);
+    let bus = draws.then(BusCycle::new);
+
+    let mut network: Network<Node, Q> = build::network(scenario);
+    let mut recorder = (Fingerprints::default(), (metrics, bus));
+    let until = match scenario.run.duration {
+        Extent::Time(span) => Until::Time(Time::ZERO + span),
+        Extent::Cycles(cycles) => Until::Cycle(cycles),
+    };
+    while !network.run(until, STRIDE, &mut recorder) {
+        watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
+    }
+    watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
+    let (fingerprints, (metrics, bus)) = recorder;
+    let (counts, sinks) = metrics.finish(network.now());
+
+    let summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
+    conclude(summary, sinks, bus.as_ref(), &fingerprints, dir)
+}
+
+/// Adds the fingerprints, then writes the files.
+fn conclude(
+    mut summary: Summary,
+    sinks: Sinks,
+    bus: Option<&BusCycle>,
+    fingerprints: &Fingerprints,
+    dir: Option<PathBuf>,
+) -> Result<Outcome, RunError> {
+    let mut digest = Digest::default();
+    digest.octets(&serde_json::to_vec(&summary)?);
+    let statistics = digest.value();
+    let fingerprint = fingerprints.total();
+    let texts = [
+        ("wire", fingerprint.wire),
+        ("states", fingerprint.states),
+        ("latches", fingerprint.latches),
+        ("statistics", statistics),
+    ];
+    summary.fingerprint = texts.map(|(name, hash)| (name.to_owned(), format!("{hash:016x}"))).to_vec();
+
+    if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {
+        plots.write(dir, &distributions(&sinks.histograms), bus)?;
+        summary.files.extend(Plots::files().map(str::to_owned));
+    }
+    if let Some(exports) = sinks.exports {
+        exports.finish(&sinks.histograms, &mut summary)?;
+    }
+    Ok(Outcome { summary, fingerprint, stations: fingerprints.stations().collect(), statistics, dir })
+}
+
+/// How many cycles the run will have, about: a scenario in time starts up for a moment before the first.
+fn cycles(scenario: &Scenario) -> u64 {
+    match scenario.run.duration {
+        Extent::Time(span) => span.div_floor(scenario.master.t_dp).max(0) as u64,
+        Extent::Cycles(cycles) => cycles,
+    }
+}
+
+/// The slaves that take part and their links.
+pub fn layout(scenario: &Scenario) -> Layout {
+    let slaves = scenario.slaves.iter().filter(|slave| !slave.silent);
+    let slaves = slaves.map(|slave| SlaveLayout { address: slave.address, t_i: slave.times.t_i }).collect();
+    let links = scenario.links.iter().map(|link| (link.publisher, link.subscriber)).collect();
+    Layout::new(scenario.master.address, scenario.master.t_dp, slaves, links)
+}
+
+fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
+    PlotMeta {
+        scenario: scenario.name.clone(),
+        seed: scenario.run.seed,
+        t_dp: scenario.master.t_dp,
+        slaves: layout.slaves().iter().map(|slave| slave.address).collect(),
+        links: layout.links().to_vec(),
+        duration: scenario.master.t_dp * cycles(scenario) as i64,
+    }
+}
+
+fn facts(scenario: &Scenario) -> Facts {
+    let slaves = scenario.slaves.iter().filter(|slave| !slave.silent);
+    Facts {
+        scenario: scenario.name.clone(),
+        bit_rate: scenario.bus.params.rate,
+        seed: scenario.run.seed,
+        slaves: slaves
+            .map(|slave| SlaveFacts { device: slave.device.name.to_owned(), t_o: Some(slave.times.t_o) })
+            .collect(),
+        fingerprint: Vec::new(),
+    }
+}
+
+/// What the pictures show of the histograms.
+fn distributions(histograms: &Histograms) -> Distributions {
+    let of = |name: &str, subject| {
+        let quantity = Quantity::named(name).expect("a line of the registry");
+        histograms.get(name, subject).map_or_else(Distribution::default, |found| distribution(quantity, found))
+    };
+    let link = |&(publisher, subscriber): &(Address, Address)| {
+        let subject = Subject::Link(publisher, subscriber);
+        let [wire, publish, age] = ["wire", "publish", "age"].map(|name| of(name, subject));
+        LinkLatencies { publisher, subscriber, wire, publish, age }
+    };
+    Distributions {
+        latch_skew: of("latch_skew", Subject::Network),
+        t_dp_deviation: of("t_dp_deviation", Subject::Network),
+        links: histograms.layout().links().iter().map(link).collect(),
+    }
+}
+
+fn distribution(quantity: &Quantity, histogram: &Histogram) -> Distribution {
+    let value = |span: Span| quantity.unit.of(span);
+    let marks = [("p50", 50.0), ("p90", 90.0), ("p99", 99.0), ("p99.9", 99.9)];
+    let marks = marks.into_iter().filter_map(|(label, percent)| Some((label, histogram.percentile(percent)?)));
+    let marks = marks.chain(histogram.max().map(|max| ("max", max)));
+    Distribution {
+        title: quantity.title.to_owned(),
+        unit: quantity.unit.text().to_owned(),
+        bins: histogram.bins(BINS).iter().map(|bin| (value(bin.from), value(bin.to), bin.count)).collect(),
+        marks: marks.map(|(label, span)| (label.to_owned(), value(span))).collect(),
+        count: histogram.count(),
+    }
+}

@@ -1,0 +1,1020 @@
+//! Tests: what good files become, and what each mistake in a file is answered with.
+
+use super::*;
+use crate::sim::motion::Angle;
+use crate::time::BitRate;
+use proptest::prelude::*;
+
+/// A scenario with every table.
+const GOOD: &str = r#"# Does a clock lost every 100 cycles trip 0F04?
+# Expected: no. Source: Model: D15.
+
+[run]
+seed = 7
+duration = "20 s"
+
+[bus]
+rate = "12 Mbit/s"
+cable = "100 m"
+
+[master]
+address = 2
+t_dp = "4 ms"
+t_i = "125 us"
+t_o = "2 ms"
+gc_jitter = { kind = "bounded-normal", sigma = "100 ns", bound = "400 ns" }
+
+[[slave]]
+addresses = "3..5"
+device = "posital-ocd-dpb1b"
+crystal = { within = "50 ppm" }
+motion = { kind = "speed", speed = "1500 rpm" }
+
+[[slave]]
+address = 11
+device = "subscriber-drive"
+position = "10 m"
+t_sdr = "40 tbit"
+
+[[link]]
+publisher = 3
+subscriber = 11
+
+[[event]]
+at = "1 s"
+do = "hold-life-sign"
+slave = 3
+for = 2
+
+[[disturbance]]
+kind = "missing-clocks"
+from_cycle = 1000
+every = 100
+
+[record]
+links_csv = false
+"#;
+
+fn address(number: u8) -> Address {
+    Address::new(number).unwrap()
+}
+fn parse(text: &str, sets: &[(&str, &str)]) -> Result<Scenario, ScenarioError> {
+    let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
+    Scenario::parse("good", "good.toml", text, &sets)
+}
+fn good(sets: &[(&str, &str)]) -> Scenario {
+    parse(GOOD, sets).unwrap_or_else(|error| panic!("{error}"))
+}
+/// What is said of the good file after `from` became `to`.
+fn said(from: &str, to: &str) -> String {
+    assert_eq!(GOOD.matches(from).count(), 1, "{from}");
+    match parse(&GOOD.replace(from, to), &[]) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("nothing is said of {to}"),
+    }
+}
+/// Compares what is said of the good file after each change with what should be.
+fn check(cases: &[(&str, &str, &str)]) {
+    for (from, to, expected) in cases {
+        assert_eq!(said(from, to), expected.trim(), "{from} -> {to}");
+    }
+}
+/// Compares what is said of the good file with each override with what should be.
+fn check_sets(cases: &[(&str, &str, &str)]) {
+    for (key, value, expected) in cases {
+        assert_eq!(said_of_set(key, value), expected.trim(), "{key}={value}");
+    }
+}
+/// What is said of the good file with this override.
+fn said_of_set(key: &str, value: &str) -> String {
+    match parse(GOOD, &[(key, value)]) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("nothing is said of {key}={value}"),
+    }
+}
+
+#[test]
+fn keys_that_are_wrong() {
+    check(&[
+        (
+            "t_o = \"2 ms\"",
+            "t_0 = \"2 ms\"",
+            r#"
+good.toml:12:2: master.t_o: this key is missing, and slave 3 has no own t_o
+  12 | [master]
+     |  ^^^^^^
+  rule: every slave has its T_O (manual 3.3)
+  help: for example: t_o = "1 ms"
+
+good.toml:16:1: master.t_0: there is no such key
+  16 | t_0 = "2 ms"
+     | ^^^
+  help: did you mean "t_o"?
+"#,
+        ),
+        (
+            "t_o = \"2 ms\"\n",
+            "",
+            r#"
+good.toml:12:2: master.t_o: this key is missing, and slave 3 has no own t_o
+  12 | [master]
+     |  ^^^^^^
+  rule: every slave has its T_O (manual 3.3)
+  help: for example: t_o = "1 ms"
+"#,
+        ),
+        (
+            "t_o = \"2 ms\"",
+            "t_o = 2",
+            r#"
+good.toml:16:7: master.t_o: this is a number
+  16 | t_o = 2
+     |       ^
+  help: write a number with its unit in quotation marks, such as "125 us"
+"#,
+        ),
+        (
+            "t_o = \"2 ms\"",
+            "t_o = \"0.1 ns\"",
+            r#"
+good.toml:16:7: master.t_o: "0.1 ns" is not a whole number of ticks of 1/12 ns; its neighbours are "1 tick" and "2 tick"
+  16 | t_o = "0.1 ns"
+     |       ^^^^^^^^
+"#,
+        ),
+        (
+            "posital-ocd-dpb1b",
+            "posital-ocd-dpb1",
+            r#"
+good.toml:21:10: slave.3.device: there is no device "posital-ocd-dpb1"
+  21 | device = "posital-ocd-dpb1"
+     |          ^^^^^^^^^^^^^^^^^^
+  help: did you mean "posital-ocd-dpb1b"?
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn words_and_tables_that_are_wrong() {
+    check(&[
+        (
+            "\"speed\"",
+            "\"spin\"",
+            r#"
+good.toml:23:19: slave.3.motion.kind: there is no motion "spin"
+  23 | motion = { kind = "spin", speed = "1500 rpm" }
+     |                   ^^^^^^
+  help: known here: standstill, speed, sine, table
+"#,
+        ),
+        (
+            "seed = 7",
+            "seed = -7",
+            r"
+good.toml:5:8: run.seed: -7 is out of range
+  5 | seed = -7
+    |        ^^
+  help: a whole number from 0 to 18446744073709551615
+",
+        ),
+        (
+            "seed = 7",
+            "seed 7",
+            r"
+good.toml:5:6: key with no value, expected `=`
+  5 | seed 7
+    |      ^
+  rule: the file is TOML 1.0 (toml.io)
+",
+        ),
+        (
+            "seed = 7",
+            "seed = 7\ncycles = 5",
+            r#"
+good.toml:4:2: run: a run has either duration or cycles
+  4 | [run]
+    |  ^^^
+  help: for example: duration = "20 s", or cycles = 10000
+"#,
+        ),
+        (
+            "[[link]]",
+            "[[lnk]]",
+            r#"
+good.toml:31:3: lnk: there is no such table
+  31 | [[lnk]]
+     |   ^^^
+  help: did you mean "link"?
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn stations_that_cannot_be() {
+    check(&[
+        (
+            "3..5",
+            "3..12",
+            r"
+good.toml:26:11: slave.address: two slaves have the address 11
+  26 | address = 11
+     |           ^^
+  rule: every station of a bus has an address of its own (EN 50170-2)
+",
+        ),
+        (
+            "3..5",
+            "2..5",
+            r#"
+good.toml:20:13: slave.2.address: the master and a slave have the address 2
+  20 | addresses = "2..5"
+     |             ^^^^^^
+  rule: every station of a bus has an address of its own (EN 50170-2)
+"#,
+        ),
+        (
+            "3..5",
+            "5..3",
+            r#"
+good.toml:20:13: slave.addresses: "5..3" is no address and no range of addresses
+  20 | addresses = "5..3"
+     |             ^^^^^^
+  help: addresses are 0 to 125; a range is written "3..10" and includes both ends
+"#,
+        ),
+        (
+            "within = \"50 ppm\"",
+            "within = \"500 ppm\"",
+            r#"
+good.toml:22:11: slave.3.crystal: a crystal is not off by 500 ppm
+  22 | crystal = { within = "500 ppm" }
+     |           ^^^^^^^^^^^^^^^^^^^^^^
+  rule: a crystal is within 200 ppm (Model: twice what cheap ones have)
+  help: "200 ppm" at most
+"#,
+        ),
+        (
+            "cable = \"100 m\"",
+            "cable = \"9 m\"",
+            r#"
+good.toml:28:12: slave.11.position: 10 m is beyond the end of the cable
+  28 | position = "10 m"
+     |            ^^^^^^
+  rule: a station is 0 m to 9 m along the cable (Model: one line)
+  help: for example under [bus]: cable = "10 m"
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn bus_parameters_that_break_a_rule() {
+    check(&[
+        (
+            "12 Mbit/s",
+            "500 kbit/s",
+            r#"
+good.toml:9:8: bus.rate: 500 kbit/s is too slow for isochronous mode
+  9 | rate = "500 kbit/s"
+    |        ^^^^^^^^^^^^
+  rule: isochronous mode is offered from 1.5 Mbit/s on (SIMODRIVE 611 universal manual)
+  help: "1.5 Mbit/s", "3 Mbit/s", "6 Mbit/s" or "12 Mbit/s"
+"#,
+        ),
+        (
+            "12 Mbit/s",
+            "10 Mbit/s",
+            r#"
+good.toml:9:8: bus.rate: "10 Mbit/s" is not a bit rate of PROFIBUS DP; the nearest is "12 Mbit/s"
+  9 | rate = "10 Mbit/s"
+    |        ^^^^^^^^^^^
+"#,
+        ),
+        (
+            "cable = \"100 m\"",
+            "cable = \"20 km\"",
+            r#"
+good.toml:10:9: bus.t_sl: 1000 is not allowed here
+  10 | cable = "20 km"
+     |         ^^^^^^^
+  rule: T_SL >= 2 T_TD + max(max T_SDR, T_ID1) + 11 + T_SM (EN 50170-2)
+  help: 3254 to 16383 with the other bus parameters and the cable
+"#,
+        ),
+        (
+            "40 tbit",
+            "900 tbit",
+            r#"
+good.toml:29:9: slave.11.t_sdr: 900 tbit is not what this slave may take to answer
+  29 | t_sdr = "900 tbit"
+     |         ^^^^^^^^^^
+  rule: min_tsdr = 11 tbit <= T_SDR <= MaxTsdr = 800 tbit of subscriber-drive (Model: D2)
+  help: t_sdr = "800 tbit"
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn a_t_dp_that_does_not_work() {
+    check(&[
+        (
+            "t_dp = \"4 ms\"",
+            "t_dp = \"64 ms\"",
+            r#"
+good.toml:14:8: master.t_dp: T_DP = 64 ms is out of the range of posital-ocd-dpb1b
+  14 | t_dp = "64 ms"
+     |        ^^^^^^^
+  rule: T_DP is 500 us to 32 ms (manual 3.3.2)
+  help: t_dp = "32 ms"
+"#,
+        ),
+        (
+            "t_dp = \"4 ms\"",
+            "t_dp = \"4.1 ms\"",
+            r#"
+good.toml:14:8: master.t_dp: T_DP = 4.1 ms is not on the grid of posital-ocd-dpb1b
+  14 | t_dp = "4.1 ms"
+     |        ^^^^^^^^
+  rule: T_DP is a multiple of T_BASE_DP = 125 us (manual 3.3.1, 3.3.2)
+  help: the neighbours are t_dp = "4 ms" and "4.125 ms"
+"#,
+        ),
+        (
+            "t_dp = \"4 ms\"",
+            "t_dp = \"500 us\"",
+            r#"
+good.toml:14:8: master.t_dp: T_DP = 500 us cannot hold the cycle of 4 slaves
+  14 | t_dp = "500 us"
+     |        ^^^^^^^^
+  rule: T_DP >= T_DX 478.6 us + GAP 95.167 us + token 9.083 us + Global_Control 18.25 us = 601.1 us (manual 3.3.2)
+  help: the shortest is t_dp = "875 us"
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn t_i_and_t_o_that_do_not_work() {
+    check(&[
+        (
+            "t_o = \"2 ms\"",
+            "t_o = \"0.5 ms\"",
+            r#"
+good.toml:16:7: slave.3.t_o: T_O = 500 us is too early for slave 3
+  16 | t_o = "0.5 ms"
+     |       ^^^^^^^^
+  rule: T_O > T_DX + T_O_MIN = 478.6 us + 125 us = 603.6 us (manual 3.3.6, Model: D3)
+  help: the earliest is t_o = "625 us"
+"#,
+        ),
+        (
+            "t_o = \"2 ms\"",
+            "t_o = \"2.1 ms\"",
+            r#"
+good.toml:16:7: slave.3.t_o: T_O = 2.1 ms is not on the grid
+  16 | t_o = "2.1 ms"
+     |       ^^^^^^^^
+  rule: T_O is a multiple of T_BASE_IO = 125 us (manual 3.3.4, 3.3.6)
+  help: the neighbours are t_o = "2 ms" and "2.125 ms"
+"#,
+        ),
+        (
+            "t_o = \"2 ms\"",
+            "t_o = \"3.875 ms\"",
+            r#"
+good.toml:16:7: slave.3.t_o: T_O = 3.875 ms is only 0 ns before the latch of slave 3
+  16 | t_o = "3.875 ms"
+     |       ^^^^^^^^^^
+  rule: (T_DP - T_I) - T_O >= 125 us with scaling, preset and code sequence off, here (4 ms - 125 us) - 3.875 ms (manual 3.3.5, 3.3.6, Model: D3)
+  help: the latest is t_o = "3.75 ms"
+"#,
+        ),
+        (
+            "t_dp = \"4 ms\"",
+            "t_dp = \"750 us\"",
+            r#"
+good.toml:16:7: slave.3.t_o: T_O = 2 ms comes after the latch of slave 3
+  16 | t_o = "2 ms"
+     |       ^^^^^^
+  rule: (T_DP - T_I) - T_O >= 125 us with scaling, preset and code sequence off, here (750 us - 125 us) - 2 ms (manual 3.3.5, 3.3.6, Model: D3)
+  help: no T_O fits between T_DX and the latch; the shortest is t_dp = "875 us"
+"#,
+        ),
+        (
+            "t_i = \"125 us\"",
+            "t_i = \"0 us\"",
+            r#"
+good.toml:15:7: slave.3.t_i: T_I = 0 ns is too short for slave 3
+  15 | t_i = "0 us"
+     |       ^^^^^^
+  rule: T_I >= 125 us with scaling, preset and code sequence off (manual 3.3.5)
+  help: the shortest is t_i = "125 us"
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn times_of_one_slave_that_do_not_work() {
+    check(&[
+        (
+            "crystal = { within = \"50 ppm\" }",
+            "crystal = { within = \"50 ppm\" }\nscaling = { units_per_rev = 100, total_range = 12800 }",
+            r#"
+good.toml:15:7: slave.3.t_i: T_I = 125 us is too short for slave 3
+  15 | t_i = "125 us"
+     |       ^^^^^^^^
+  rule: T_I >= 375 us with scaling, preset and code sequence on (manual 3.2.2)
+  help: the shortest is t_i = "375 us"
+"#,
+        ),
+        (
+            "position = \"10 m\"",
+            "position = \"10 m\"\nt_pll_w = \"100 ns\"",
+            r#"
+good.toml:29:11: slave.11.t_pll_w: T_PLL_W = 100 ns is between two steps
+  29 | t_pll_w = "100 ns"
+     |           ^^^^^^^^
+  rule: T_PLL_W is a whole number of 1/12 us (manual 3.3.8)
+  help: the neighbours are t_pll_w = "1000 tick" (83.333 ns) and "2000 tick" (166.667 ns)
+"#,
+        ),
+        (
+            "position = \"10 m\"",
+            "position = \"10 m\"\nt_pll_w = \"100 us\"",
+            r#"
+good.toml:29:11: slave.11.t_pll_w: T_PLL_W = 100 us is out of range
+  29 | t_pll_w = "100 us"
+     |           ^^^^^^^^
+  rule: T_PLL_W is 83.333 ns to 20 us for subscriber-drive (manual 3.3.8)
+  help: t_pll_w = "20 us"
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn scaling_that_the_encoder_refuses() {
+    check(&[
+        (
+            "crystal = { within = \"50 ppm\" }",
+            "crystal = { within = \"50 ppm\" }\nt_i = \"375 us\"\nscaling = { units_per_rev = 9000, total_range = 12800 }",
+            r"
+good.toml:24:29: slave.3.scaling.units_per_rev: 9000 units per revolution are out of range
+  24 | scaling = { units_per_rev = 9000, total_range = 12800 }
+     |                             ^^^^
+  rule: 1 to 8192 units, the physical resolution of posital-ocd-dpb1b (manual 3.2.3)
+  help: units_per_rev = 8192
+",
+        ),
+        (
+            "crystal = { within = \"50 ppm\" }",
+            "crystal = { within = \"50 ppm\" }\nt_i = \"375 us\"\nscaling = { units_per_rev = 100, total_range = 500000 }",
+            r"
+good.toml:24:48: slave.3.scaling.total_range: a total range of 500000 is out of range
+  24 | scaling = { units_per_rev = 100, total_range = 500000 }
+     |                                                ^^^^^^
+  rule: total range <= 100 units per revolution x 4096 revolutions (manual 3.2.4, Model: D20)
+  help: total_range = 409600
+",
+        ),
+        (
+            "crystal = { within = \"50 ppm\" }",
+            "crystal = { within = \"50 ppm\" }\ncode_sequence = \"ccw\"",
+            r#"
+good.toml:23:17: slave.3.code_sequence: code_sequence = "ccw" has no effect in slave 3
+  23 | code_sequence = "ccw"
+     |                 ^^^^^
+  rule: the code sequence is in force with octet 15 bit 1 alone (manual 3.2.2)
+  help: add functions = true, which needs T_I and the gap of 375 us
+"#,
+        ),
+        (
+            "crystal = { within = \"50 ppm\" }",
+            "crystal = { within = \"50 ppm\" }\nfunctions = false\nscaling = { units_per_rev = 100, total_range = 12800 }",
+            r"
+good.toml:23:13: slave.3.functions: slave 3 has scaling, but functions = false
+  23 | functions = false
+     |             ^^^^^
+  rule: scaling needs octet 15 bit 1 as well as bit 3 (manual 3.2.2, Model: D21)
+  help: leave out functions, or leave out scaling
+",
+        ),
+    ]);
+}
+
+#[test]
+fn jitter_that_does_not_fit() {
+    check(&[
+        (
+            "bound = \"400 ns\"",
+            "bound = \"2 ms\"",
+            r#"
+good.toml:17:13: master.gc_jitter: jitter of 2 ms (its bound) does not fit into the spare time of 3.399 ms
+  17 | gc_jitter = { kind = "bounded-normal", sigma = "100 ns", bound = "2 ms" }
+     |             ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+  rule: 2 x 2 ms <= T_DP 4 ms - cycle 601.1 us (Model: D1, D6)
+  help: at most 1.699 ms, or a longer t_dp
+"#,
+        ),
+        (
+            "bound = \"400 ns\"",
+            "bound = \"1 ns\"",
+            r#"
+good.toml:17:13: master.gc_jitter: bound = 1 ns is less than a quarter of sigma = 100 ns; uniform jitter is nearly the same
+  17 | gc_jitter = { kind = "bounded-normal", sigma = "100 ns", bound = "1 ns" }
+     |             ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn links_that_cannot_be() {
+    check(&[
+        (
+            "publisher = 3",
+            "publisher = 11",
+            r"
+good.toml:32:13: link.1.publisher: slave 11 cannot publish
+  32 | publisher = 11
+     |             ^^
+  rule: subscriber-drive has no publisher function (its profile, manual 3.4)
+",
+        ),
+        (
+            "publisher = 3",
+            "publisher = 9",
+            r"
+good.toml:32:13: link.1.publisher: there is no slave 9
+  32 | publisher = 9
+     |             ^
+  help: the slaves are 3, 4, 5, 11
+",
+        ),
+        (
+            "subscriber = 11",
+            "subscriber = 4",
+            r"
+good.toml:33:14: link.1.subscriber: slave 4 cannot subscribe
+  33 | subscriber = 4
+     |              ^
+  rule: posital-ocd-dpb1b has no subscriber function (its profile, manual 3.4)
+  help: subscriber-drive can
+",
+        ),
+        (
+            "subscriber = 11",
+            "subscriber = 11\noffset = 10",
+            r"
+good.toml:34:10: link.1.length: a sample of 4 octets from octet 10 on is not in the publisher's data
+  34 | offset = 10
+     |          ^^
+  rule: length >= 1 and offset 10 + length 4 <= 12 octets of posital-ocd-dpb1b (DXB link table)
+  help: offset = 4, length = 4 is G1_XIST1 of telegram 81
+",
+        ),
+        (
+            "subscriber = 11",
+            "subscriber = 11\n\n[[link]]\npublisher = 3\nsubscriber = 11\noffset = 8",
+            r"
+good.toml:37:14: link.2.subscriber: slave 11 has this publisher already
+  37 | subscriber = 11
+     |              ^^
+  rule: one link per publisher and subscriber (Model: D26 counts latencies by this pair)
+  help: one link whose sample holds both
+",
+        ),
+    ]);
+}
+
+#[test]
+fn events_and_disturbances_that_cannot_be() {
+    check(&[
+        (
+            "hold-life-sign",
+            "hold-live-sign",
+            r#"
+good.toml:37:6: event.1.do: there is no action "hold-live-sign"
+  37 | do = "hold-live-sign"
+     |      ^^^^^^^^^^^^^^^^
+  help: did you mean "hold-life-sign"?
+"#,
+        ),
+        (
+            "slave = 3\n",
+            "slave = 9\n",
+            r"
+good.toml:38:9: event.1.slave: there is no slave 9
+  38 | slave = 9
+     |         ^
+  help: the slaves are 3, 4, 5, 11
+",
+        ),
+        (
+            "at = \"1 s\"",
+            "at = \"30 s\"",
+            r#"
+good.toml:36:6: event.1.at: the run is over before this event
+  36 | at = "30 s"
+     |      ^^^^^^
+  help: a longer run, or an earlier event
+"#,
+        ),
+        (
+            "every = 100",
+            "every = 0",
+            r"
+good.toml:44:9: disturbance.1.every: 0 is out of range
+  44 | every = 0
+     |         ^
+  help: a whole number from 1 to 9223372036854775807
+",
+        ),
+    ]);
+}
+
+#[test]
+fn overrides_that_cannot_be() {
+    check_sets(&[
+        (
+            "master.t_o",
+            "0.5 ms",
+            r#"
+--set "master.t_o=0.5 ms": slave.3.t_o: T_O = 500 us is too early for slave 3
+  rule: T_O > T_DX + T_O_MIN = 478.6 us + 125 us = 603.6 us (manual 3.3.6, Model: D3)
+  help: the earliest is t_o = "625 us"
+"#,
+        ),
+        (
+            "slave.3.crystal",
+            "20 pmp",
+            r#"
+--set "slave.3.crystal=20 pmp": slave.3.crystal: "20 pmp" has the unit "pmp"; a deviation of a frequency has one of the units ppm, ppb
+"#,
+        ),
+        (
+            "slave.9.crystal",
+            "2 ppm",
+            r#"
+--set "slave.9.crystal=2 ppm": slave.9.crystal: no slave has the address "9"
+"#,
+        ),
+        (
+            "master.t_ox",
+            "1 ms",
+            r#"
+--set "master.t_ox=1 ms": master.t_ox: there is no such key
+  help: did you mean "t_o"?
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn overrides_of_the_bus_and_of_what_is_not_there() {
+    check_sets(&[
+        (
+            "bus.t_sl",
+            "100 tbit",
+            r#"
+--set "bus.t_sl=100 tbit": bus.t_sl: 100 is not allowed here
+  rule: T_SL >= 2 T_TD + max(max T_SDR, T_ID1) + 11 + T_SM (EN 50170-2)
+  help: 866 to 16383 with the other bus parameters and the cable
+"#,
+        ),
+        (
+            "bus.max_tsdr",
+            "100 tbit",
+            r#"
+--set "bus.max_tsdr=100 tbit": bus.max_tsdr: 100 tbit is too short for slave 11
+  rule: subscriber-drive may take MaxTsdr = 800 tbit at 12 Mbit/s (Model: D2)
+  help: max_tsdr = "800 tbit" or more
+"#,
+        ),
+        (
+            "bus.hsa",
+            "10",
+            r"
+good.toml:26:11: slave.11.address: the address 11 is above hsa = 10
+  26 | address = 11
+     |           ^^
+  rule: no station is above the highest station address HSA (EN 50170-2)
+  help: hsa = 11 or more, at most 126
+",
+        ),
+        (
+            "link.2.length",
+            "1",
+            r#"
+--set "link.2.length=1": link.2.length: there is no [[link]] number "2"
+  help: the first is 1
+"#,
+        ),
+        (
+            "record",
+            "5",
+            r#"
+--set "record=5": record: an override names a table and a key
+  help: for example master.t_dp=2 ms, slave.3.crystal=20 ppm, link.1.length=2
+"#,
+        ),
+        (
+            "mastr.t_o",
+            "1 ms",
+            r#"
+--set "mastr.t_o=1 ms": mastr.t_o: there is no such table
+  help: did you mean "master"?
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn overrides_that_break_a_rule() {
+    check_sets(&[
+        (
+            "master.watchdog",
+            "2570 ms",
+            r#"
+--set "master.watchdog=2570 ms": master.watchdog: no watchdog runs for 2.57 s
+  rule: a watchdog is 10 ms x WD_Fact_1 x WD_Fact_2 with factors from 1 to 255 (Set_Prm octets 2 and 3)
+  help: the nearest are "2.56 s" and "2.58 s", and "0 ms" is off
+"#,
+        ),
+        (
+            "master.watchdog",
+            "0 ms",
+            r#"
+--set "master.watchdog=0 ms": master.watchdog: links need the watchdog
+  rule: a subscriber watches its links for the watchdog time (VPC3+ manual, Model: D27)
+  help: watchdog = "200 ms"
+"#,
+        ),
+        (
+            "master.t_mapc",
+            "15",
+            r#"
+--set "master.t_mapc=15": master.t_mapc: T_MAPC = 15 x T_DP is out of range
+  rule: T_MAPC is 1 to 14 x T_DP (manual 3.3.3, octet 43)
+  help: t_mapc = 14
+"#,
+        ),
+        (
+            "run.duration",
+            "0 s",
+            r#"
+--set "run.duration=0 s": run.duration: a run of no time shows nothing
+"#,
+        ),
+        (
+            "run.cycles",
+            "1000000000000",
+            r#"
+--set "run.cycles=1000000000000": run.cycles: 1000000000000 cycles of 4 ms are too long
+  rule: a run ends within 24 years (Model: range of time)
+  help: cycles = 189216000000 at most
+"#,
+        ),
+    ]);
+}
+
+#[test]
+fn rules_without_a_place_of_their_own() {
+    let said = |sets: &[(&str, &str)]| parse(GOOD, sets).map_or_else(|error| error.to_string(), |_| String::new());
+    let text = said(&[("master.t_dp", "16 ms"), ("master.watchdog", "10 ms")]);
+    assert!(text.contains("a watchdog of 10 ms runs out in every cycle"), "{text}");
+    let text = said(&[("master.gc_jitter.kind", "normal"), ("master.gc_jitter.sigma", "1 ms")]);
+    assert!(text.contains("did you mean") || text.contains("there is no such key"), "{text}");
+    let text = said(&[("slave.11.t_pll_d", "6 ms")]);
+    assert!(text.contains("T_PLL_D = 6 ms is out of range"), "{text}");
+    let text = said(&[("master.t_i", "200000 h")]);
+    assert!(text.contains("master.t_i: 720000000 s is longer than any bus cycle"), "{text}");
+    let text = said(&[("slave.3.powered_at", "212000 h")]);
+    assert!(text.contains("slave.3.powered_at: \"212000 h\" is after the end of every run"), "{text}");
+    let text = said(&[("slave.11.t_i", "200 us")]);
+    assert!(text.contains("the neighbours are t_i = \"125 us\" and \"250 us\""), "{text}");
+    let text = said(&[("disturbance.1.kind", "lost-telegrams"), ("disturbance.1.to", "99")]);
+    assert!(text.contains("disturbance.1.to: there is no slave 99"), "{text}");
+    let text = said(&[("slave.11.scaling.units_per_rev", "8"), ("slave.11.scaling.total_range", "8")]);
+    assert!(text.contains("slave.11.scaling: subscriber-drive has no scaling"), "{text}");
+    let text = said(&[("slave.3.silent", "true")]);
+    assert!(text.contains("link.1.publisher: slave 3 is silent"), "{text}");
+    let text = said(&[("event.1.cycle", "5001")]);
+    assert!(text.contains("event.1.cycle: the run is over before this event"), "{text}");
+}
+
+#[test]
+fn a_subscriber_has_at_most_29_links() {
+    let link = |i| format!("[[link]]\npublisher = {}\nsubscriber = 100\n", i + 3);
+    let links = (0..30).map(link).collect::<Vec<_>>().concat();
+    let text = format!(
+        "[run]\ncycles = 9\n[bus]\nrate = \"12 Mbit/s\"\n[master]\naddress = 2\nt_dp = \"8 ms\"\nt_i = \"125 us\"\n\
+         t_o = \"5 ms\"\n[[slave]]\naddresses = \"3..32\"\ndevice = \"posital-ocd-dpb1b\"\n[[slave]]\naddress = 100\n\
+         device = \"subscriber-drive\"\n{links}"
+    );
+    let said = parse(&text, &[]).unwrap_err().to_string();
+    assert!(said.contains("link.30.subscriber: slave 100 has more than 29 links"), "{said}");
+}
+
+#[test]
+fn a_good_file_becomes_a_scenario() {
+    let scenario = good(&[]);
+    assert_eq!(scenario.question, "Does a clock lost every 100 cycles trip 0F04?\nExpected: no. Source: Model: D15.");
+    assert_eq!(scenario.run, Run { seed: 7, duration: Extent::Time(Span::from_s(20)) });
+    assert_eq!(scenario.bus, Bus { params: BusParams::profile(BitRate::M12), cable_mm: 100_000 });
+    assert_eq!(scenario.master.t_dp, Span::from_ms(4));
+    let (sigma, bound) = (Span::from_ns(100), Span::from_ns(400));
+    assert_eq!(scenario.master.gc_jitter, GcJitter::BoundedNormal { sigma, bound });
+    let stations: Vec<_> = scenario.slaves.iter().map(|s| (s.address.get(), s.position_mm, s.t_sdr.0)).collect();
+    assert_eq!(stations, [(3, 25_000, 30), (4, 50_000, 30), (5, 75_000, 30), (11, 10_000, 40)]);
+    assert_eq!(scenario.slaves[0].crystal, Crystal::Within(50_000));
+    assert_eq!(scenario.slaves[0].motion, Motion::Speed { start: Angle::ZERO, micro_rpm: 1_500_000_000 });
+    let (publisher, subscriber) = (address(3), address(11));
+    assert_eq!(scenario.links, [Link { publisher, subscriber, offset: 4, length: 4 }]);
+    let action = Action::HoldLifeSign { cycles: Some(2) };
+    assert_eq!(scenario.events, [Event { when: When::Time(Span::from_s(1)), slaves: vec![publisher], action }]);
+    let bursts = Bursts { from_cycle: 1_000, count: 1, every: Some(100) };
+    assert_eq!(scenario.disturbances, [Disturbance::MissingClocks { bursts }]);
+    assert_eq!(scenario.record.tables, [CsvTable::Cycles, CsvTable::Slaves, CsvTable::Events]);
+    assert!(scenario.publishes(publisher) && !scenario.publishes(subscriber));
+}
+
+#[test]
+fn what_is_left_out_has_its_default() {
+    let text = "[run]\ncycles = 1000\n[bus]\nrate = \"12 Mbit/s\"\n[master]\naddress = 2\nt_dp = \"8 ms\"\n\
+                [[slave]]\naddress = 3\ndevice = \"posital-ocd-dpb1b\"\nt_i = \"125 us\"\nt_o = \"4 ms\"\n";
+    let device = crate::device::profile::find("posital-ocd-dpb1b").unwrap();
+    assert_eq!(parse(text, &[]).unwrap(), Scenario { name: "good".into(), ..tests::network(BitRate::M12, device, 1) });
+}
+
+#[test]
+fn overrides_take_the_place_of_what_the_file_says() {
+    let scenario = good(&[
+        ("run.cycles", "500"),
+        ("master.t_o", "1.5 ms"),
+        ("slave.4.crystal", "20 ppm"),
+        ("slave.4.t_o", "1 ms"),
+        ("slave.5.scaling.units_per_rev", "100"),
+        ("slave.5.scaling.total_range", "12800"),
+        ("slave.5.t_i", "375 us"),
+        ("master.gc_jitter.sigma", "\"50 ns\""),
+        ("event.1.slaves", "[3, 4]"),
+        ("event.1.cycle", "0x10"),
+        ("record.plots", "false"),
+    ]);
+    assert_eq!(scenario.run.duration, Extent::Cycles(500));
+    let t_o: Vec<_> = scenario.slaves.iter().map(|s| s.times.t_o.as_us() as u32).collect();
+    assert_eq!(t_o, [1_500, 1_000, 1_500, 1_500]);
+    let crystals: Vec<_> = scenario.slaves[..3].iter().map(|s| s.crystal).collect();
+    assert_eq!(crystals, [Crystal::Within(50_000), Crystal::Offset(20_000), Crystal::Within(50_000)]);
+    assert_eq!(scenario.slaves[2].scaling, Some(Scaling { units_per_rev: 100, total_range: 12_800 }));
+    assert!(scenario.slaves[2].functions && !scenario.slaves[1].functions);
+    assert!(matches!(scenario.master.gc_jitter, GcJitter::BoundedNormal { sigma, .. } if sigma == Span::from_ns(50)));
+    assert_eq!((scenario.events[0].when, scenario.events[0].slaves.len()), (When::Cycle(16), 2));
+    assert!(!scenario.record.plots);
+}
+
+#[test]
+fn every_kind_can_be_read() {
+    let motion = |kind: &str| match kind {
+        "standstill" => "at = \"90 deg\"",
+        "speed" => "speed = \"-3 rpm\", start = \"1 rev\"",
+        "sine" => "amplitude = \"1 rev\", period = \"2 s\", centre = \"0 rev\", phase = \"90 deg\"",
+        _ => "table = [[\"0 s\", \"0 rev\"], [\"1 s\", \"2 rev\"]]",
+    };
+    for kind in kinds::MOTIONS {
+        let table = format!("{{ kind = \"{}\", {} }}", kind.name, motion(kind.name));
+        let scenario = good(&[("slave.3.motion", &table)]);
+        assert!(format!("{:?}", scenario.slaves[0].motion).to_lowercase().starts_with(kind.name));
+    }
+    for kind in crate::sim::noise::KINDS {
+        let values = kind.parameters.iter().map(|key| format!(", {key} = \"1 us\"")).collect::<Vec<_>>().concat();
+        let scenario = good(&[("master.gc_jitter", &format!("{{ kind = \"{}\"{values} }}", kind.name))]);
+        assert_eq!(scenario.master.gc_jitter.kind(), kind);
+    }
+    for kind in kinds::ACTIONS {
+        let about = if ["clear", "operate"].contains(&kind.name) { "" } else { "slaves = \"all\"" };
+        let value = match kind.name {
+            "jump-life-sign" => "to = 9",
+            "control-word" => "value = 0x2000",
+            "read-parameter" => "parameter = 979\nelements = 6",
+            "change-parameter" => "parameter = 918\nvalue = 7",
+            "set-prm" => "octets = [[24, 0x05], [16, 255]]\nlength = 58",
+            _ => "",
+        };
+        let event = format!("at = \"1 s\"\ndo = \"{}\"\n{about}\n{value}\n\n[[disturbance]]", kind.name);
+        let start = GOOD.find("at = \"1 s\"").unwrap();
+        let end = GOOD.find("[[disturbance]]").unwrap();
+        let text = [&GOOD[..start], &event, &GOOD[end + "[[disturbance]]".len()..]].concat();
+        let scenario = parse(&text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(scenario.events[0].slaves.is_empty(), about.is_empty(), "{}", kind.name);
+    }
+    for kind in kinds::DISTURBANCES {
+        good(&[("disturbance.1.kind", kind.name)]);
+    }
+}
+
+#[test]
+fn columns_count_characters() {
+    let said = said("seed = 7", "\"s\u{e9}\u{e9}d\" = 7");
+    assert!(said.starts_with("good.toml:5:1: run.s\u{e9}\u{e9}d: there is no such key"), "{said}");
+    let said = parse("[run]\r\n\tseed = \"\u{fc}\", cycles = 1\r\n", &[]).unwrap_err().to_string();
+    assert!(said.starts_with("good.toml:2:12: "), "{said}");
+}
+
+#[test]
+fn files_that_cannot_be_scenarios() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |path: &Path| {
+        let said = Scenario::load(path, &[]).unwrap_err().to_string();
+        said.replace(&folder.path().display().to_string(), "FOLDER").replace('\\', "/")
+    };
+    let written = |name: &str, octets: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, octets).unwrap();
+        path
+    };
+    let huge = written("huge.toml", b"");
+    File::options().write(true).open(&huge).unwrap().set_len(100_000_000).unwrap();
+    let latin = b"[run]\n# 10 \xB5s\n";
+    for (path, expected) in [
+        (folder.path().to_owned(), "FOLDER: this is a directory\n  help: name one scenario file in it, *.toml"),
+        (folder.path().join("none.toml"), "FOLDER/none.toml: there is no such file"),
+        (huge, "FOLDER/huge.toml: a 100 MB file is no scenario\n  rule: a scenario has at most 4 MB"),
+        (
+            written("empty.toml", b" \n\n"),
+            "FOLDER/empty.toml: the scenario is empty\n  help: it needs [run], [bus], [master] and a [[slave]]",
+        ),
+        (
+            written("latin.toml", latin),
+            "FOLDER/latin.toml: this file is no UTF-8 text: octet B5 in line 2\n  help: save it as UTF-8; a scenario is a \
+             text file",
+        ),
+    ] {
+        assert_eq!(said(&path), expected);
+    }
+    let path = written("with mark.toml", format!("\u{feff}{GOOD}").as_bytes());
+    assert_eq!(Scenario::load(&path, &[]), Ok(Scenario { name: "with mark".into(), ..good(&[]) }));
+}
+
+/// The good file with some octets taken out and others put in.
+fn disturbed() -> impl Strategy<Value = Vec<u8>> {
+    let octets = prop_oneof![
+        prop::collection::vec(any::<u8>(), 0..20),
+        "[-a-z0-9_\\[\\]{}=\"., \n]{0,20}".prop_map(String::into_bytes),
+        prop::sample::select(vec![
+            "99999999999999999999",
+            "-1",
+            "\"-1 s\"",
+            "\"9e9 s\"",
+            "[]",
+            "{}",
+            "1979-05-27",
+            "nan"
+        ])
+        .prop_map(|text| text.as_bytes().to_vec()),
+    ];
+    (0..GOOD.len(), 0..30usize, octets).prop_map(|(start, length, octets)| {
+        let good = GOOD.as_bytes();
+        [&good[..start], &octets, &good[(start + length).min(good.len())..]].concat()
+    })
+}
+
+proptest! {
+    #[test]
+    fn no_octets_panic(octets in prop_oneof![prop::collection::vec(any::<u8>(), 0..400), disturbed()]) {
+        if let Ok(text) = decode(&octets)
+            && let Err(error) = parse(text, &[])
+        {
+            prop_assert!(!error.problems.is_empty() && !error.to_string().is_empty());
+        }
+    }
+    #[test]
+    fn no_override_panics(
+        key in "(master|slave|run|bus|link|event|x)(\\.(3|1|0|t_o|rate|cable|motion|)){0,3}",
+        value in ".{0,30}",
+    ) {
+        if let Err(error) = parse(GOOD, &[(&key, &value)]) {
+            prop_assert!(!error.problems.is_empty());
+        }
+    }
+    #[test]
+    fn numbers_of_any_size_do_not_panic(
+        place in prop::sample::select(vec![
+            "master.t_dp", "master.t_i", "master.t_o", "master.t_pll_w", "slave.3.t_pll_d", "run.duration", "slave.3.powered_at",
+            "bus.cable", "slave.3.position", "bus.t_sl", "bus.t_set", "bus.t_qui", "bus.max_tsdr", "bus.min_tsdr",
+            "slave.3.t_sdr", "slave.3.crystal", "master.gc_jitter.sigma", "master.gc_jitter.bound", "run.cycles",
+            "disturbance.1.every", "link.1.offset", "link.1.length", "bus.hsa", "master.t_mapc", "master.watchdog",
+        ]),
+        number in prop_oneof![any::<i64>(), -1000i64..100_000],
+        unit in prop::sample::select(vec!["", " tick", " us", " s", " tbit", " m", " km", " ppb"]),
+    ) {
+        if let Err(error) = parse(GOOD, &[(place, &format!("{number}{unit}"))]) {
+            prop_assert!(!error.problems.is_empty());
+        }
+    }
+}

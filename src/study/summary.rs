@@ -1,0 +1,397 @@
+//! Summary: what a run came to, as one value. The screen and `summary.json` show the same.
+
+use serde::{Serialize, Serializer};
+
+use super::count::{Counts, SlaveCounts};
+use super::export::decimal::Decimal;
+use super::export::thinning::Thinning;
+use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
+use crate::time::{BitRate, Span};
+use crate::wire::Address;
+
+/// What a run came to. Keys of the JSON name their units; a quantity without value is `null`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// The network and the run.
+    pub network: Network,
+    /// The bus cycle.
+    pub timing: Timing,
+    /// What happened how often.
+    pub counts: Happened,
+    /// Distributions of the network's quantities, by name.
+    #[serde(serialize_with = "map")]
+    pub distributions: Vec<(&'static str, Distribution)>,
+    /// Per slave, in address order.
+    pub slaves: Vec<SlaveSummary>,
+    /// Per link, by publisher, then subscriber.
+    pub links: Vec<LinkSummary>,
+    /// Name and text of each fingerprint.
+    #[serde(serialize_with = "map")]
+    pub fingerprint: Vec<(String, String)>,
+    /// What each table of rows kept.
+    pub thinning: Vec<Thinning>,
+    /// Events that `events.csv` does not hold.
+    pub events_left_out: u64,
+    /// The files of the run.
+    pub files: Vec<String>,
+}
+
+/// What only the builder of a run knows.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Facts {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Bit rate.
+    pub bit_rate: BitRate,
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// The slaves in address order.
+    pub slaves: Vec<SlaveFacts>,
+    /// Name and text of each fingerprint.
+    pub fingerprint: Vec<(String, String)>,
+}
+
+/// What only the builder of a run knows of one slave.
+#[derive(Clone, PartialEq, Debug)]
+pub struct SlaveFacts {
+    /// Name of the device profile.
+    pub device: String,
+    /// T_O (manual 3.3.6); none for a slave without set points.
+    pub t_o: Option<Span>,
+}
+
+/// The network and the run.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Network {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Bit rate with its unit.
+    pub bit_rate: &'static str,
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Address of the master.
+    pub master: u8,
+    /// Number of slaves.
+    pub slaves: usize,
+    /// Number of slave-to-slave links.
+    pub links: usize,
+    /// Cycles that began.
+    pub cycles: u64,
+    /// True length of the run.
+    #[serde(rename = "duration_s", serialize_with = "s")]
+    pub duration: Span,
+}
+
+/// The bus cycle.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Timing {
+    /// Nominal T_DP.
+    #[serde(rename = "t_dp_us", serialize_with = "us")]
+    pub t_dp: Span,
+    /// Longest T_DX of the run.
+    #[serde(rename = "t_dx_max_us", serialize_with = "us_or_null")]
+    pub t_dx_max: Option<Span>,
+    /// T_DP minus the longest T_DX.
+    #[serde(rename = "left_after_t_dx_us", serialize_with = "us_or_null")]
+    pub left: Option<Span>,
+    /// Shortest silence before a SYNCH.
+    #[serde(rename = "spare_min_us", serialize_with = "us_or_null")]
+    pub spare_min: Option<Span>,
+    /// Smallest T_I.
+    #[serde(rename = "t_i_min_us", serialize_with = "us_or_null")]
+    pub t_i_min: Option<Span>,
+    /// Largest T_I.
+    #[serde(rename = "t_i_max_us", serialize_with = "us_or_null")]
+    pub t_i_max: Option<Span>,
+    /// Smallest T_O.
+    #[serde(rename = "t_o_min_us", serialize_with = "us_or_null")]
+    pub t_o_min: Option<Span>,
+    /// Largest T_O.
+    #[serde(rename = "t_o_max_us", serialize_with = "us_or_null")]
+    pub t_o_max: Option<Span>,
+}
+
+/// What happened how often in the network.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct Happened {
+    /// Faults that slaves latched.
+    pub faults: u64,
+    /// Requests that the master repeated.
+    pub retries: u64,
+    /// Requests without answer after all retries.
+    pub no_answers: u64,
+    /// SYNCHs that could not be sent when planned.
+    pub late_clocks: u64,
+    /// Tokens claimed after silence, the first one included.
+    pub tokens_claimed: u64,
+    /// Telegrams that overlapped.
+    pub collisions: u64,
+    /// Telegrams that the scenario disturbed.
+    pub disturbed: u64,
+    /// Events.
+    pub events: u64,
+    /// Largest latch skew \[steps\].
+    pub skew_max_steps: Option<f64>,
+}
+
+/// What became of one slave.
+#[derive(Clone, Debug, Serialize)]
+pub struct SlaveSummary {
+    /// Its address.
+    pub address: u8,
+    /// Name of the device profile.
+    pub device: String,
+    /// DP state at the end.
+    pub state: &'static str,
+    /// Start-up phase at the end.
+    pub phase: &'static str,
+    /// State of the clock recovery at the end.
+    pub pll: &'static str,
+    /// T_I.
+    #[serde(rename = "t_i_us", serialize_with = "us")]
+    pub t_i: Span,
+    /// T_O.
+    #[serde(rename = "t_o_us", serialize_with = "us_or_null")]
+    pub t_o: Option<Span>,
+    /// Cycles from the first SYNCH taken to the lock of the clock recovery.
+    pub lock_cycles: Option<u64>,
+    /// True time of the same.
+    #[serde(rename = "lock_ms", serialize_with = "ms_or_null")]
+    pub lock: Option<Span>,
+    /// How often the clock recovery locked again.
+    pub resynchronisations: u64,
+    /// SYNCH outside the window or missing.
+    pub clock_failures: u64,
+    /// How often each fault was latched, by its code.
+    #[serde(serialize_with = "map")]
+    pub faults: Vec<(String, u64)>,
+    /// Faults that were acknowledged.
+    pub acknowledgements: u64,
+    /// Requests that the master repeated.
+    pub retries: u64,
+    /// Requests without answer after all retries.
+    pub no_answers: u64,
+    /// True time in each start-up phase.
+    #[serde(rename = "phases_ms", serialize_with = "phases")]
+    pub phases: Vec<(&'static str, Span)>,
+    /// Distributions of the slave's quantities, by name.
+    #[serde(serialize_with = "map")]
+    pub distributions: Vec<(&'static str, Distribution)>,
+}
+
+/// The latencies of one link.
+#[derive(Clone, Debug, Serialize)]
+pub struct LinkSummary {
+    /// Whose data.
+    pub publisher: u8,
+    /// Who takes them.
+    pub subscriber: u8,
+    /// Distributions of the link's quantities, by name.
+    #[serde(serialize_with = "map")]
+    pub distributions: Vec<(&'static str, Distribution)>,
+}
+
+/// A distribution in a few numbers. Percentiles have three significant digits, the rest is exact.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct Distribution {
+    /// Values.
+    pub count: u64,
+    /// Of these, values beyond the histogram's bounds.
+    pub out_of_range: u64,
+    /// Smallest value.
+    #[serde(rename = "min_ns", serialize_with = "ns_or_null")]
+    pub min: Option<Span>,
+    /// Mean.
+    #[serde(rename = "mean_ns", serialize_with = "ns_or_null")]
+    pub mean: Option<Span>,
+    /// Median.
+    #[serde(rename = "p50_ns", serialize_with = "ns_or_null")]
+    pub p50: Option<Span>,
+    /// 90th percentile.
+    #[serde(rename = "p90_ns", serialize_with = "ns_or_null")]
+    pub p90: Option<Span>,
+    /// 99th percentile.
+    #[serde(rename = "p99_ns", serialize_with = "ns_or_null")]
+    pub p99: Option<Span>,
+    /// 99.9th percentile.
+    #[serde(rename = "p99.9_ns", serialize_with = "ns_or_null")]
+    pub p99_9: Option<Span>,
+    /// Largest value.
+    #[serde(rename = "max_ns", serialize_with = "ns_or_null")]
+    pub max: Option<Span>,
+    /// 99th percentile of the magnitudes.
+    #[serde(rename = "magnitude_p99_ns", serialize_with = "ns_or_null")]
+    pub magnitude_p99: Option<Span>,
+    /// The value farthest from zero, with its sign.
+    #[serde(rename = "farthest_ns", serialize_with = "ns_or_null")]
+    pub farthest: Option<Span>,
+}
+
+impl Distribution {
+    /// The numbers of a histogram.
+    pub fn of(histogram: &Histogram) -> Self {
+        Self {
+            count: histogram.count(),
+            out_of_range: histogram.below() + histogram.above(),
+            min: histogram.min(),
+            mean: histogram.mean(),
+            p50: histogram.percentile(50.0),
+            p90: histogram.percentile(90.0),
+            p99: histogram.percentile(99.0),
+            p99_9: histogram.percentile(99.9),
+            max: histogram.max(),
+            magnitude_p99: histogram.magnitude_percentile(99.0),
+            farthest: histogram.farthest(),
+        }
+    }
+}
+
+impl Summary {
+    /// The summary of a run. Files and thinning are added by the exports.
+    ///
+    /// # Panics
+    /// If the facts, the counts and the histograms are not of the same slaves.
+    pub fn new(facts: Facts, counts: &Counts, histograms: &Histograms) -> Self {
+        let layout = histograms.layout();
+        assert_eq!(facts.slaves.len(), layout.slaves().len(), "facts of other slaves");
+        assert_eq!(counts.slaves.len(), layout.slaves().len(), "counts of other slaves");
+        let link = |&(publisher, subscriber): &(Address, Address)| LinkSummary {
+            publisher: publisher.get(),
+            subscriber: subscriber.get(),
+            distributions: distributions(histograms, Subject::Link(publisher, subscriber)),
+        };
+        Self {
+            timing: timing(&facts, histograms),
+            counts: happened(counts),
+            distributions: distributions(histograms, Subject::Network),
+            slaves: (0..facts.slaves.len()).map(|index| slave(index, &facts, counts, histograms)).collect(),
+            links: layout.links().iter().map(link).collect(),
+            network: Network {
+                scenario: facts.scenario,
+                bit_rate: facts.bit_rate.text(),
+                seed: facts.seed,
+                master: layout.master.get(),
+                slaves: layout.slaves().len(),
+                links: layout.links().len(),
+                cycles: counts.network.cycles,
+                duration: counts.network.duration,
+            },
+            fingerprint: facts.fingerprint,
+            thinning: Vec::new(),
+            events_left_out: 0,
+            files: Vec::new(),
+        }
+    }
+
+    /// A distribution of the network by the name of its quantity.
+    pub fn distribution(&self, name: &str) -> Option<&Distribution> {
+        named(&self.distributions, name)
+    }
+}
+impl SlaveSummary {
+    /// A distribution of the slave by the name of its quantity.
+    pub fn distribution(&self, name: &str) -> Option<&Distribution> {
+        named(&self.distributions, name)
+    }
+    /// All faults, whatever their code.
+    pub fn fault_count(&self) -> u64 {
+        self.faults.iter().map(|fault| fault.1).sum()
+    }
+}
+impl LinkSummary {
+    /// A distribution of the link by the name of its quantity.
+    pub fn distribution(&self, name: &str) -> Option<&Distribution> {
+        named(&self.distributions, name)
+    }
+}
+
+fn named<'a>(all: &'a [(&'static str, Distribution)], name: &str) -> Option<&'a Distribution> {
+    all.iter().find(|distribution| distribution.0 == name).map(|distribution| &distribution.1)
+}
+
+/// Everything that is recorded of one subject.
+fn distributions(histograms: &Histograms, subject: Subject) -> Vec<(&'static str, Distribution)> {
+    let of = |name| Some((name, Distribution::of(histograms.get(name, subject)?)));
+    QUANTITIES.iter().filter_map(|quantity| of(quantity.name)).collect()
+}
+
+fn timing(facts: &Facts, histograms: &Histograms) -> Timing {
+    let layout = histograms.layout();
+    let network = |name| histograms.get(name, Subject::Network);
+    let t_dx_max = network("t_dx").and_then(Histogram::max);
+    let t_i = || layout.slaves().iter().map(|slave| slave.t_i);
+    let t_o = || facts.slaves.iter().filter_map(|slave| slave.t_o);
+    Timing {
+        t_dp: layout.t_dp,
+        t_dx_max,
+        left: t_dx_max.map(|t_dx| layout.t_dp - t_dx),
+        spare_min: network("spare").and_then(Histogram::min),
+        t_i_min: t_i().min(),
+        t_i_max: t_i().max(),
+        t_o_min: t_o().min(),
+        t_o_max: t_o().max(),
+    }
+}
+
+fn happened(counts: &Counts) -> Happened {
+    let network = &counts.network;
+    Happened {
+        faults: counts.slaves.iter().map(SlaveCounts::fault_count).sum(),
+        retries: network.retries,
+        no_answers: network.no_answers,
+        late_clocks: network.late_clocks,
+        tokens_claimed: network.tokens_claimed,
+        collisions: network.collisions,
+        disturbed: network.disturbed,
+        events: network.events,
+        skew_max_steps: network.skew_counts,
+    }
+}
+
+fn slave(index: usize, facts: &Facts, counts: &Counts, histograms: &Histograms) -> SlaveSummary {
+    let (facts, counts) = (&facts.slaves[index], &counts.slaves[index]);
+    let phases = crate::observation::Phase::ALL.iter().zip(counts.phases);
+    SlaveSummary {
+        address: counts.address.get(),
+        device: facts.device.clone(),
+        state: counts.state.text(),
+        phase: counts.phase.text(),
+        pll: counts.pll.text(),
+        t_i: histograms.layout().slaves()[index].t_i,
+        t_o: facts.t_o,
+        lock_cycles: counts.lock.map(|lock| lock.cycles),
+        lock: counts.lock.map(|lock| lock.span),
+        resynchronisations: counts.resynchronisations,
+        clock_failures: counts.clock_failures,
+        faults: counts.faults.iter().map(|(code, count)| (format!("{code:04X}"), *count)).collect(),
+        acknowledgements: counts.acknowledgements,
+        retries: counts.retries,
+        no_answers: counts.no_answers,
+        phases: phases.map(|(phase, span)| (phase.text(), span)).collect(),
+        distributions: distributions(histograms, Subject::Slave(counts.address)),
+    }
+}
+
+fn map<S: Serializer, K: Serialize, V: Serialize>(entries: &[(K, V)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(entries.iter().map(|(key, value)| (key, value)))
+}
+fn phases<S: Serializer>(phases: &[(&'static str, Span)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(phases.iter().map(|&(phase, span)| (phase, Decimal::ms(span))))
+}
+
+/// Functions that serialize spans as numbers of one unit, by reference as serde asks for it.
+macro_rules! units {
+    ($($function:ident = $decimal:ident of $type:ty;)*) => {$(
+        #[allow(clippy::trivially_copy_pass_by_ref)]
+        fn $function<S: Serializer>(span: &$type, serializer: S) -> Result<S::Ok, S::Error> {
+            Option::<Span>::from(*span).map(Decimal::$decimal).serialize(serializer)
+        }
+    )*};
+}
+units! {
+    s = s of Span;
+    us = us of Span;
+    us_or_null = us of Option<Span>;
+    ns_or_null = ns of Option<Span>;
+    ms_or_null = ms of Option<Span>;
+}

@@ -1,0 +1,5 @@
+//! The tests of the whole, in one binary.
+
+mod determinism;
+mod layers;
+mod support;

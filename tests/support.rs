@@ -1,0 +1,108 @@
+//! A run with everything kept, for tests that look at it.
+
+use std::path::PathBuf;
+
+use isodp::device::node::Node;
+use isodp::observation::Observation;
+use isodp::sim::fingerprint::{Fingerprint, Fingerprints};
+use isodp::sim::network::{Network, NetworkEvent, Until};
+use isodp::sim::queue::{NearQueue, Queue};
+use isodp::sim::record::{Recorder, Stamp, Transmission};
+use isodp::study::build;
+use isodp::study::count::Counts;
+use isodp::study::metric::Metrics;
+use isodp::study::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
+use isodp::study::run;
+use isodp::study::scenario::{Extent, Scenario};
+use isodp::time::Time;
+use isodp::wire::Address;
+
+/// The shipped scenario of this name, with changed values.
+pub(crate) fn scenario(name: &str, sets: &[(&str, &str)]) -> Scenario {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{name}.toml"));
+    let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
+    Scenario::load(&path, &sets).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A station address.
+pub(crate) fn address(number: u8) -> Address {
+    Address::new(number).expect("an address")
+}
+
+/// Everything that a run left.
+#[derive(Default)]
+pub(crate) struct Run {
+    pub(crate) cycles: Vec<CycleRow>,
+    pub(crate) slaves: Vec<SlaveRow>,
+    pub(crate) links: Vec<LinkRow>,
+    pub(crate) events: Vec<EventRow>,
+    /// Every observation: when, who, what.
+    pub(crate) observations: Vec<(Time, Address, Observation)>,
+    /// Every telegram: first bit, last bit, sender, octets.
+    pub(crate) telegrams: Vec<(Time, Time, Address, Vec<u8>)>,
+    pub(crate) counts: Option<Counts>,
+    pub(crate) fingerprint: Fingerprint,
+    pub(crate) stations: Vec<(Address, Fingerprint)>,
+}
+
+impl Run {
+    /// Runs a scenario on the usual queue.
+    pub(crate) fn of(scenario: &Scenario) -> Self {
+        Self::on::<NearQueue<NetworkEvent>>(scenario)
+    }
+    /// Runs a scenario on a queue of this kind.
+    pub(crate) fn on<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Self {
+        let mut network: Network<Node, Q> = build::network(scenario);
+        let rows = Metrics::new(run::layout(scenario), |_, _| 0.0, Self::default());
+        let mut recorder = (Fingerprints::default(), (rows, Log(Self::default())));
+        let until = match scenario.run.duration {
+            Extent::Time(span) => Until::Time(Time::ZERO + span),
+            Extent::Cycles(cycles) => Until::Cycle(cycles),
+        };
+        assert!(network.run(until, 100_000_000, &mut recorder), "the run does not end");
+        let (fingerprints, (rows, Log(log))) = recorder;
+        let (counts, rows) = rows.finish(network.now());
+        Self {
+            counts: Some(counts),
+            observations: log.observations,
+            telegrams: log.telegrams,
+            fingerprint: fingerprints.total(),
+            stations: fingerprints.stations().collect(),
+            ..rows
+        }
+    }
+    /// The rows of one slave.
+    pub(crate) fn slave(&self, number: u8) -> impl Iterator<Item = &SlaveRow> {
+        self.slaves.iter().filter(move |row| row.slave == address(number))
+    }
+    /// The events of one station.
+    pub(crate) fn events_of(&self, number: u8) -> impl Iterator<Item = &EventRow> {
+        self.events.iter().filter(move |row| row.station == address(number))
+    }
+}
+
+impl Sink for Run {
+    fn cycle(&mut self, row: &CycleRow) {
+        self.cycles.push(*row);
+    }
+    fn slave(&mut self, row: &SlaveRow) {
+        self.slaves.push(*row);
+    }
+    fn link(&mut self, row: &LinkRow) {
+        self.links.push(*row);
+    }
+    fn event(&mut self, row: &EventRow) {
+        self.events.push(*row);
+    }
+}
+
+struct Log(Run);
+
+impl Recorder for Log {
+    fn telegram(&mut self, telegram: &Transmission<'_>) {
+        self.0.telegrams.push((telegram.start, telegram.end, telegram.sender, telegram.octets.to_vec()));
+    }
+    fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+        self.0.observations.push((stamp.at, stamp.station, *what));
+    }
+}
