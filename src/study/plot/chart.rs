@@ -40,6 +40,13 @@ impl Axis {
         let air = (axis.hi - axis.lo) * 0.05;
         Self { lo: axis.lo - air, hi: axis.hi + air, ..axis }
     }
+    /// Over the columns of a histogram with air on both ends, and so wide that one column alone looks narrow.
+    pub(super) fn over(name: impl Into<String>, grid: &Grid) -> Self {
+        const NARROW: f64 = 16.0;
+        let (lo, hi) = (grid.left(0), grid.right());
+        let missing = (NARROW * (grid.left(1) - lo) - (hi - lo)).max(0.0) / 2.0;
+        Self::airy(name, lo - missing, hi + missing)
+    }
     /// Counts from 0 to `hi`, logarithmic.
     pub(super) fn counts(name: impl Into<String>, hi: f64) -> Self {
         Self { name: name.into(), lo: 0.0, hi: hi.max(1.0) * 1.6, scale: Scale::Counts }

@@ -30,7 +30,9 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
             Key::new("percentiles and maximum", VERMILION, Swatch::Dashes),
         ];
         legend(canvas, &mut area, &keys);
-        let x = Axis::airy(format!("latch skew [{}]", skew.unit), grid.left(0).min(0.0), grid.right().max(skew.top()));
+        // From zero, so that the skew is seen for what it is.
+        let fitting = Axis::over(format!("latch skew [{}]", skew.unit), &grid);
+        let x = Axis { lo: fitting.lo.min(-0.02 * fitting.hi), ..fitting };
         let counts = skew.columns(&grid);
         let most = counts.iter().copied().fold(0.0, f64::max);
         let outer = Area { top: area.top + 44, ..area };

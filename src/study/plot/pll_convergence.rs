@@ -14,8 +14,8 @@ use crate::time::Span;
 const CYCLES: usize = 120;
 /// What is shown after the last lock [cycles].
 const AFTER_LOCK: usize = 20;
-/// Errors below this are drawn linearly [ns]: about half a timer quantum.
-const LINEAR: f64 = 10.0;
+/// Errors below this are drawn linearly [ns]: five timer quanta, so that rounding does not look like a swing.
+const LINEAR: f64 = 100.0;
 
 /// One clock instant of one slave.
 #[derive(Clone, Copy, Debug)]

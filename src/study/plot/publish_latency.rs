@@ -3,18 +3,17 @@
 use plotters::style::RGBColor;
 
 use super::Material;
-use super::chart::{Axis, Chart, short};
+use super::chart::{Axis, Chart, plain};
 use super::distribution::{Distribution, Grid, LinkLatencies};
 use super::look::{
     Area, BLUE, Canvas, Font, GREY, INK, Key, Swatch, VERMILION, Words, counted, empty_page, fit, page, series, swatch,
-    text_width,
 };
 
 const COLUMNS: usize = 100;
 /// Height of a panel [px].
 const PANEL: i32 = 300;
 /// Width of the table beside a panel [px].
-const TABLE: i32 = 470;
+const TABLE: i32 = 510;
 /// Width of the links' names in the table [px].
 const NAMES: i32 = 190;
 /// Most links that are drawn one by one.
@@ -76,7 +75,7 @@ fn panel(canvas: &mut Canvas<'_>, area: Area, kind: &Kind, links: &[LinkLatencie
         canvas.text(body.centre(), "Nothing of this kind was recorded.", Font::new(14).middle().ink(GREY));
         return;
     };
-    let x = Axis::airy("latency [us]", grid.left(0), grid.right());
+    let x = Axis::over("latency [us]", &grid);
     let entries = entries(kind, &filled, &grid);
     let most = entries.iter().flat_map(|entry| entry.counts.iter().copied()).fold(0.0, f64::max);
     let outer = Area { right: area.right - TABLE, ..body };
@@ -115,6 +114,16 @@ fn entries<'a>(kind: &Kind, links: &[&'a LinkLatencies], grid: &Grid) -> Vec<Ent
     entries
 }
 
+/// To the nanosecond as far as a column has room.
+fn exact(value: f64) -> String {
+    let decimals = match value.abs() {
+        v if v >= 10_000.0 => 1,
+        v if v >= 1_000.0 => 2,
+        _ => 3,
+    };
+    plain(value, decimals)
+}
+
 /// The legend with the percentiles of each entry.
 fn table(canvas: &mut Canvas<'_>, area: Area, entries: &[Entry<'_>]) {
     const ROW: i32 = 22;
@@ -132,8 +141,7 @@ fn table(canvas: &mut Canvas<'_>, area: Area, entries: &[Entry<'_>]) {
         swatch(canvas, (area.left + 10, y), &entry.key);
         canvas.text((area.left + 44, y), &fit(&entry.key.label, 12, NAMES - 48), Font::new(12));
         for (index, (_, value)) in entry.marks.iter().flat_map(|of| of.marks.iter()).enumerate() {
-            let text = short(*value);
-            debug_assert!(text_width(&text, 12) < column || header.marks.len() > 6, "{text} is too wide");
+            let text = exact(*value);
             canvas.text((right(index), y), &fit(&text, 12, column - 6), Font::new(12).right());
         }
     }
