@@ -351,7 +351,7 @@ const WORDS: [(&str, &[&str]); 7] = [
     ("latch_skew.svg", &["Latch skew:", "latch skew [ns]", "cycles (logarithmic)", "p99.9 ", "cycles per column"]),
     ("pll_convergence.svg", &["PLL convergence:", "error and window [ns]", "cycles since", "± window", "locked at"]),
     ("t_dp_deviation.svg", &["T_DP deviation:", "T_DP deviation [ns]", "time [", "cycles (logarithmic)", "p99 "]),
-    ("timeline.svg", &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "telegram lost", "slave 3"]),
+    ("timeline.svg", &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "telegram disturbed", "slave 3"]),
     ("publish_latency.svg", &["Publish latency:", "latency [us]", "Wire:", "Publish:", "Age at use:", "p99.9"]),
     ("bus_cycle.svg", &["Bus cycle:", "time from t0 [us]", "T_DP ", "T_O ", "T_I ", "T_DX ", "spare ", "SYNCH", "DXB"]),
     ("position.svg", &["Position:", "G1_XIST1 [steps]", "time ["]),
