@@ -30,7 +30,8 @@ pub trait Function {
     fn parameterise(&mut self, prm: &SetPrm<'_>, watchdog: Option<Span>);
     /// Tolerated failures of the master's sign of life that these parameters ask for (manual 3.2.5).
     fn max_failures(prm: &SetPrm<'_>) -> u8;
-    /// Whether these parameters switch on what takes the longer computing time (manual 3.2.2).
+    /// Whether these parameters enable scaling, preset and code sequence, which take the longer computing time (manual
+    /// 3.2.2).
     fn slow(prm: &SetPrm<'_>) -> bool;
     /// G1_XIST1 and the right-justified position for G1_XIST2 at this raw position (steps).
     fn position(&self, raw: u32) -> (u32, u32);
@@ -339,6 +340,8 @@ impl<F: Function> Application for Body<F> {
         self.iso = iso
             .and_then(|block| IsoM::parse(&block).ok())
             .map(|iso| Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), self.settings.clock_tolerance)));
+        let preset_enabled = self.settings.sensor.preset_enabled && F::slow(prm);
+        self.sensor = Sensor::new(SensorOptions { preset_enabled, ..self.settings.sensor });
         self.function.parameterise(prm, watchdog);
     }
     fn enter(&mut self, _now: Local, out: &mut Outbox) {
