@@ -359,6 +359,8 @@ impl<F: Function> Application for Body<F> {
             iso.exchanged(out);
         }
         if !self.is_locked() {
+            // A preset is about the position that this reply carries.
+            self.raw = sample;
             self.take_over(out);
             self.latch(sample, false, out);
         }
