@@ -238,6 +238,7 @@ impl<F: Function> Body<F> {
         let (t_dp, latch, set_point) = (iso.t_dp_units(), iso.t_i_units(), iso.t_o_units());
         let earliest = u64::from(iso.t_dx) + units(self.profile.t_o_min);
         let gap = units(self.profile.gap_min(slow));
+        let window = u64::from(iso.t_pll_w).max(units(self.profile.min_window));
         let range = units(self.profile.t_dp_min)..=units(self.profile.t_dp_max);
         let rules = [
             (9, t_dp, range.contains(&t_dp), "T_DP [1/12 us] is within the device's range (manual 3.3.2)"),
@@ -261,6 +262,12 @@ impl<F: Function> Body<F> {
                 u64::from(iso.t_pll_w),
                 iso.t_pll_w <= self.profile.t_pll_w_max,
                 "T_PLL_W [1/12 us] is not above T_PLL_W_MAX (GSD)",
+            ),
+            (
+                26,
+                u64::from(iso.t_pll_d),
+                u64::from(iso.t_pll_d) + window < latch,
+                "T_PLL_D [1/12 us] leaves the delayed latch before the next clock (manual 3.3.9, Model: D13)",
             ),
         ];
         match rules.into_iter().find(|&(.., good, _)| !good) {
