@@ -2,7 +2,8 @@
 
 mod determinism;
 mod encoder;
-mod encoder_scenarios;
 mod layers;
+mod manual;
 mod rig;
+mod scenarios;
 mod support;

@@ -49,7 +49,7 @@ pub struct Parameter {
     /// Format of its value or of each element.
     pub format: Format,
     /// Elements, from subindex 0; 0 for a parameter that is no array.
-    pub elements: u16,
+    pub elements: usize,
 }
 
 /// Every parameter, by number (manual 4; elements PROFIdrive).
@@ -314,7 +314,7 @@ mod tests {
     }
     /// Every element of `parameter`.
     fn whole(parameter: &Parameter) -> ParameterAddress {
-        let elements = parameter.elements.len() as u8;
+        let elements = parameter.elements as u8;
         ParameterAddress { attribute: ParameterAddress::VALUE, elements, pnu: parameter.pnu, subindex: 0 }
     }
 
@@ -395,11 +395,11 @@ mod tests {
             let response = Response::parse(&response).unwrap();
             let values: Vec<_> = response.values().collect();
             assert_eq!((response.id, values.len(), values[0].format), (ResponseId::Read, 1, parameter.format));
-            match parameter.elements.len() {
+            match parameter.elements {
                 0 => assert_eq!(values[0].data.len(), 2, "P{}", parameter.pnu),
                 elements => assert_eq!(values[0].count(), elements, "P{}", parameter.pnu),
             }
-            for subindex in 0..parameter.elements.len() {
+            for subindex in 0..parameter.elements {
                 let address = ParameterAddress { elements: 1, subindex: subindex as u16, ..whole(parameter) };
                 let response = answered(&device, &read(&[address])).unwrap();
                 let element = Response::parse(&response).unwrap().values().next().and_then(|one| one.unsigned(0));
