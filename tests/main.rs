@@ -1,7 +1,9 @@
 //! The tests of the whole, in one binary.
 
 mod determinism;
+mod encoder;
 mod layers;
 mod manual;
+mod rig;
 mod scenarios;
 mod support;
