@@ -1,5 +1,6 @@
 //! The tests of the whole, in one binary.
 
 mod determinism;
+mod devices;
 mod layers;
 mod support;

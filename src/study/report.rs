@@ -191,7 +191,7 @@ fn files(summary: &Summary, dir: Option<&str>, lines: &mut Vec<String>) {
 
 /// Lines of a table whose columns are as wide as their widest cell; the columns of `left` are flush left, the others
 /// flush right.
-fn aligned(header: &[&str], left: &[usize], rows: &[Vec<String>]) -> Vec<String> {
+pub(super) fn aligned(header: &[&str], left: &[usize], rows: &[Vec<String>]) -> Vec<String> {
     let header = header.iter().map(|&title| title.to_owned()).collect::<Vec<_>>();
     let all = || std::iter::once(&header).chain(rows);
     let width = |column: usize| all().map(|row| row[column].chars().count()).max().unwrap_or(0);
