@@ -3,4 +3,6 @@
 mod determinism;
 mod devices;
 mod layers;
+mod manual;
+mod scenarios;
 mod support;

@@ -42,7 +42,12 @@ pub struct Metrics<S, V> {
     grid: Vec<Grid>,
     slaves: Vec<Watch>,
     links: Vec<LinkWatch>,
+    /// Events of the instant that is going on: a cycle that begins at this instant is theirs.
+    held: Vec<EventRow>,
 }
+
+/// Events of one instant that fit without growing: a few of every station.
+const HELD: usize = 512;
 
 /// The nominal latch instant of all slaves with one T_I.
 #[derive(Debug)]
@@ -97,7 +102,8 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
             received: false,
         };
         let links = layout.links().iter().map(link).collect();
-        Self { counts: Counts::new(&layout), open: None, grid, slaves, links, layout, shafts, sink }
+        let held = Vec::with_capacity(HELD);
+        Self { counts: Counts::new(&layout), open: None, grid, slaves, links, held, layout, shafts, sink }
     }
 
     /// What was counted until now.
@@ -110,6 +116,7 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
     }
     /// The run is over at `end`: the rows of the cycle under way leave as far as they came.
     pub fn finish(mut self, end: Time) -> (Counts, S) {
+        self.release();
         self.flush();
         self.counts.finish(end);
         (self.counts, self.sink)
@@ -136,6 +143,15 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
             acyclic: None,
             spare: None,
         });
+    }
+
+    /// Sends the held events off: their instant is over.
+    fn release(&mut self) {
+        let cycle = self.open.map_or(0, |open| open.cycle);
+        for mut event in self.held.drain(..) {
+            event.cycle = cycle;
+            self.sink.event(&event);
+        }
     }
 
     /// Sends the rows of the cycle under way off and makes everything ready for the next.
@@ -232,6 +248,9 @@ impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
     }
 
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+        if self.held.first().is_some_and(|event| event.at < stamp.at) {
+            self.release();
+        }
         self.counts.station(what);
         if stamp.station == self.layout.master {
             self.master(&stamp, what);
@@ -239,8 +258,7 @@ impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
             self.slave(index, &stamp, what);
         }
         if what.is_event() {
-            let cycle = self.open.map_or(0, |open| open.cycle);
-            self.sink.event(&EventRow { at: stamp.at, cycle, station: stamp.station, what: *what });
+            self.held.push(EventRow { at: stamp.at, cycle: 0, station: stamp.station, what: *what });
         }
     }
 }

@@ -282,6 +282,11 @@ pub(super) fn spread(wanted: &[(i32, i32)], lo: i32, hi: i32) -> Vec<i32> {
     centres
 }
 
+/// `1 slave`, `8 slaves`.
+pub(super) fn counted(number: u64, of: &str) -> String {
+    format!("{number} {of}{}", if number == 1 { "" } else { "s" })
+}
+
 /// The words around a picture.
 pub(super) struct Words<'a> {
     /// What is shown.
@@ -308,11 +313,11 @@ pub(super) fn page(
     let bottom = top + body_height;
     let height = bottom + FOOTER + 2 * MARGIN;
     let footer = format!(
-        "isodp | scenario {}, seed {}, T_DP {}, {} slaves, {} | {}",
+        "isodp | scenario {}, seed {}, T_DP {}, {}, {} | {}",
         fit(&meta.scenario, FOOTER, room / 3),
         meta.seed,
         meta.t_dp,
-        meta.slaves.len(),
+        counted(meta.slaves.len() as u64, "slave"),
         meta.duration,
         words.plotted
     );

@@ -8,7 +8,7 @@ use super::chart::{Axis, Ruler};
 use super::lanes::Lanes;
 use super::look::{
     Area, BLACK, BLUE, Canvas, FAINT, Font, GREEN, GREY, INK, Key, Lit, ORANGE, PURPLE, SKY, Swatch, VERMILION, WHITE,
-    WIDTH, Words, empty_page, lamp, legend, legend_height, page,
+    WIDTH, Words, counted, empty_page, lamp, legend, legend_height, page,
 };
 use crate::device::leds::Lamp;
 use crate::observation::{Leds, Observation, Phase, SlaveState};
@@ -48,8 +48,9 @@ const MARKS: [Mark; 5] = [
     Mark { label: "left DATA_EXCH (upper half)", column: "left", colour: PURPLE, from: 0, to: 1 },
     Mark { label: "fault acknowledged (lower half)", column: "ack", colour: GREEN, from: 1, to: 2 },
 ];
-/// What disturbs the bus, one lane each.
-const TROUBLES: [&str; 4] = ["telegram lost", "collision", "SYNCH late", "no answer"];
+/// What disturbs the network, one lane each.
+const TROUBLES: [&str; 6] =
+    ["telegram disturbed", "collision", "SYNCH late", "no answer", "sign of life held", "supply off"];
 
 /// Colour and name of each phase.
 const PHASES: [(Phase, RGBColor); 5] = [
@@ -104,12 +105,12 @@ impl Merge for Cell {
 struct Lane {
     whole: Buckets<Cell>,
     start: Buckets<Cell>,
-    totals: [u32; 5],
+    totals: [u32; TROUBLES.len()],
 }
 
 impl Lane {
     fn new() -> Self {
-        Self { whole: Buckets::new(WHOLE), start: Buckets::new(START as usize), totals: [0; 5] }
+        Self { whole: Buckets::new(WHOLE), start: Buckets::new(START as usize), totals: [0; TROUBLES.len()] }
     }
     fn each(&mut self, cycle: u64, change: impl Fn(&mut Cell)) {
         change(self.whole.at(cycle));
@@ -153,6 +154,8 @@ impl Timeline {
             Observation::Collision { .. } => Some(1),
             Observation::ClockLate { .. } => Some(2),
             Observation::NoAnswer { .. } => Some(3),
+            Observation::MasterLifeHeld { held: true, .. } => Some(4),
+            Observation::Power { on: false } => Some(5),
             _ => None,
         };
         if let Some(trouble) = trouble {
@@ -183,10 +186,11 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let words = Words {
         title: "Timeline: start-up phases, faults, LEDs and disturbances of every slave",
         subtitle: format!(
-            "{slaves} slaves, {cycles} cycles. {split}Each piece of time shows its lowest phase and, in the two \
-             strips below, the first pattern of the manual's table that the red and the green LED showed; a mark is \
-             at least {MARK} pixels wide, and marks that meet stand side by side. Numbers at the right: totals of the \
-             run."
+            "{}, {}. {split}Each piece of time shows its lowest phase and, in the two strips below, the first pattern of \
+             the manual's table that the red and the green LED showed; a mark is at least {MARK} pixels wide, and \
+             marks that meet stand side by side. Numbers at the right: totals of the run.",
+            counted(slaves as u64, "slave"),
+            counted(cycles, "cycle"),
         ),
         plotted: "phases, faults, acknowledgements, LEDs and disturbances per slave",
     };
@@ -229,7 +233,7 @@ fn keys(counter: Option<u16>) -> Vec<Key> {
     let phases =
         PHASES.iter().map(|(phase, colour)| Key::new(format!("phase {}", phase.text()), *colour, Swatch::Fill));
     let marks = MARKS.iter().map(|mark| Key::new(mark.label, mark.colour, Swatch::Fill));
-    let trouble = Key::new("disturbance of the bus", INK, Swatch::Fill);
+    let trouble = Key::new("disturbance of the network", INK, Swatch::Fill);
     let counter = counter.map(|top| {
         let label = format!("larger of the two failure counters, height of the lane = {top}");
         Key::new(label, GREY, Swatch::Line)
