@@ -8,9 +8,9 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isodp::sim::network::NetworkEvent;
 use isodp::sim::queue::NearQueue;
-use isodp::study::report;
 use isodp::study::run::{Outcome, Progress, run};
 use isodp::study::scenario::{Extent, Scenario};
+use isodp::study::{devices, report};
 use isodp::time::Span;
 
 /// A wrong call, scenario or file.
@@ -22,6 +22,8 @@ Examples:
       The main job: a complete network, its figures on screen, files under out/reference/.
   isodp run scenarios/reference.toml --seed 7 --out /tmp/results
       The same with other draws, files under /tmp/results/reference/.
+  isodp devices posital-ocd-dpb1b
+      What the profile of this device says; without a name, all devices.
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
 
@@ -40,6 +42,15 @@ enum Command {
     /// Runs a scenario and leaves figures, tables, histograms and plots.
     #[command(after_help = EXAMPLES)]
     Run(RunArgs),
+    /// Lists the devices that a scenario can name, or tells everything about one.
+    Devices(DevicesArgs),
+}
+
+#[derive(Args)]
+struct DevicesArgs {
+    /// The device to tell about.
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
 }
 
 #[derive(Args)]
@@ -66,8 +77,11 @@ fn assignment(text: &str) -> Result<(String, String), String> {
 }
 
 fn main() -> ExitCode {
-    let Command::Run(args) = Cli::parse().command;
-    match run_command(args) {
+    let result = match Cli::parse().command {
+        Command::Run(args) => run_command(args),
+        Command::Devices(args) => devices_command(args.name.as_deref()),
+    };
+    match result {
         Ok(text) => {
             anstream::print!("{text}");
             ExitCode::SUCCESS
@@ -87,6 +101,10 @@ fn run_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
     let Outcome { summary, dir, .. } = run::<NearQueue<NetworkEvent>>(&scenario, Some(&args.out), |at| bar.show(at))?;
     bar.line.finish_and_clear();
     Ok(report::render(&summary, dir.as_ref().map(|dir| dir.display().to_string()).as_deref()))
+}
+
+fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
+    Ok(name.map_or_else(|| Ok(devices::list()), devices::full)?)
 }
 
 /// The progress bar; nothing where standard error is no terminal.

@@ -1,7 +1,7 @@
 //! The tests of the whole, in one binary.
 
 mod determinism;
-mod encoder;
+mod devices;
 mod layers;
 mod manual;
 mod rig;

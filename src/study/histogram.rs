@@ -570,6 +570,7 @@ mod tests {
             state: _,
             phase: _,
             pll: _,
+            leds: _,
             pll_error,
             period: _,
             window: _,

@@ -12,7 +12,7 @@
 use super::count::Counts;
 use super::layout::Layout;
 use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
-use crate::observation::{ClockVerdict, Observation, Phase, PllState, SlaveState};
+use crate::observation::{ClockVerdict, Leds, Observation, Phase, PllState, SlaveState};
 use crate::sim::crystal::Crystal;
 use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::time::{Local, Span, Time};
@@ -286,6 +286,7 @@ impl Watch {
             state: SlaveState::PowerOn,
             phase: Phase::Configuration,
             pll: PllState::Idle,
+            leds: Leds::NoSupply,
             pll_error: None,
             period: None,
             window: None,
@@ -304,6 +305,15 @@ impl Watch {
     fn next_cycle(&mut self) {
         (self.row.pll_error, self.row.latch_offset, self.offset_counts) = (None, None, 0.0);
         (self.travelling, self.latched, self.reply) = (self.latched, None, None);
+    }
+
+    /// The supply is gone, and with it everything that the slave knew; what it latched last stays to be seen.
+    fn switched_off(&mut self) {
+        let row = &mut self.row;
+        (row.state, row.phase, row.pll, row.leds) =
+            (SlaveState::PowerOn, Phase::Configuration, PllState::Idle, Leds::NoSupply);
+        (row.period, row.window, row.mls, row.sls) = (None, None, 0, 0);
+        (row.life_counter, row.clock_counter) = (0, 0);
     }
 
     fn observe(&mut self, what: &Observation) {
@@ -326,6 +336,8 @@ impl Watch {
                     (row.period, row.window) = (None, None);
                 }
             }
+            Observation::Leds { to, .. } => row.leds = to,
+            Observation::Power { on: false } => self.switched_off(),
             Observation::Clock { verdict: ClockVerdict::Stray, .. } => {}
             Observation::Clock { verdict, error, period, window, counter } => {
                 if matches!(verdict, ClockVerdict::Hit | ClockVerdict::Outside) {
@@ -493,6 +505,42 @@ mod tests {
         let rows = kept.slaves.iter().filter(|row| row.slave == address(3));
         let values: Vec<_> = rows.map(|row| (row.mls, row.sls, row.life_counter)).collect();
         assert_eq!(values, [(6, 9, 10), (0, 0, 10), (0, 0, 0)]);
+    }
+
+    #[test]
+    fn the_leds_are_carried_over_and_a_slave_without_supply_is_dark_and_knows_nothing() {
+        let leds = |from, to| Observation::Leds { from, to };
+        let mut told = Told::new(0);
+        told.cycle(0, 0);
+        told.tell(100, 3, leds(Leds::NoSupply, Leds::NotConfigured));
+        told.tell(200, 3, leds(Leds::NotConfigured, Leds::DataExchange));
+        told.tell(
+            300,
+            3,
+            Observation::SlaveState {
+                from: SlaveState::WaitCfg,
+                to: SlaveState::DataExch,
+                cause: SlaveCause::Configured,
+            },
+        );
+        told.tell(400, 3, Observation::Phase { from: Phase::Configuration, to: Phase::Operation });
+        told.tell(500, 3, Observation::Pll { from: PllState::Idle, to: PllState::Locked });
+        told.cycle(1_000_000, 1);
+        told.cycle(2_000_000, 2);
+        told.tell(2_100_000, 3, Observation::Power { on: false });
+        told.cycle(3_000_000, 3);
+        // Only now does the slave see where it has been.
+        told.tell(3_100_000, 3, Observation::Phase { from: Phase::Operation, to: Phase::Configuration });
+        let (counts, kept) = told.over(4_000_000);
+        let rows = kept.slaves.iter().filter(|row| row.slave == address(3));
+        let values: Vec<_> = rows.map(|row| (row.leds, row.state, row.phase, row.pll)).collect();
+        let on = (Leds::DataExchange, SlaveState::DataExch, Phase::Operation, PllState::Locked);
+        let off = (Leds::NoSupply, SlaveState::PowerOn, Phase::Configuration, PllState::Idle);
+        assert_eq!(values, [on, on, off, off]);
+        let slave = &counts.slaves[0];
+        assert_eq!((slave.leds, slave.state, slave.phase, slave.pll), off);
+        let [configuration, .., operation] = slave.phases;
+        assert_eq!((configuration, operation), (Span::from_ns(1_900_400), Span::from_ns(2_099_600)));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::build;
+use super::count::Counts;
 use super::export::{EXPORTERS, ExportError, Exports, Target};
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, SlaveLayout};
@@ -147,12 +148,13 @@ pub fn run<Q: Queue<NetworkEvent>>(
     let (counts, sinks) = metrics.finish(network.now());
 
     let summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
-    conclude(summary, sinks, bus.as_ref(), &fingerprints, dir)
+    conclude(summary, &counts, sinks, bus.as_ref(), &fingerprints, dir)
 }
 
-/// Adds the fingerprints, then writes the files.
+/// Adds the fingerprints and the LEDs, then writes the files.
 fn conclude(
     mut summary: Summary,
+    counts: &Counts,
     sinks: Sinks,
     bus: Option<&BusCycle>,
     fingerprints: &Fingerprints,
@@ -169,6 +171,7 @@ fn conclude(
         ("statistics", statistics),
     ];
     summary.fingerprint = texts.map(|(name, hash)| (name.to_owned(), format!("{hash:016x}"))).to_vec();
+    summary.show_leds(counts);
 
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {
         plots.write(dir, &distributions(&sinks.histograms), bus)?;

@@ -26,6 +26,7 @@ use crate::time::{Span, Tbit};
 use crate::wire::Address;
 pub use crate::wire::parameter::Format;
 use section::Reader;
+pub(super) use section::suggestion;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
