@@ -951,6 +951,11 @@ fn files_that_cannot_be_scenarios() {
             "FOLDER/latin.toml: this file is no UTF-8 text: octet B5 in line 2\n  help: save it as UTF-8; a scenario is a \
              text file",
         ),
+        (
+            written("...toml", GOOD.as_bytes()),
+            "FOLDER/...toml: this file has no name before its extension\n  rule: the results of NAME.toml go to a \
+             directory NAME\n  help: rename it",
+        ),
     ] {
         assert_eq!(said(&path), expected);
     }
