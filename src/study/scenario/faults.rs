@@ -661,6 +661,7 @@ fn overrides_that_cannot_be() {
             "2 ppm",
             r#"
 --set "slave.9.crystal=2 ppm": slave.9.crystal: no slave has the address "9"
+  help: the slaves are 3, 4, 5, 11
 "#,
         ),
         (

@@ -186,7 +186,11 @@ fn overrides(reader: &mut Reader<'_>, root: &mut Table, slaves: &mut [SlaveTable
         let result = match path[..] {
             ["slave", station, ref rest @ ..] => match slaves.iter_mut().find(|s| s.address.to_string() == station) {
                 Some(slave) => put(&mut slave.table, rest, &set.node),
-                None => Err(Fault::new(format!("no slave has the address \"{station}\""))),
+                None => {
+                    let all: Vec<_> = slaves.iter().map(|slave| slave.address.to_string()).collect();
+                    let fault = Fault::new(format!("no slave has the address \"{station}\""));
+                    Err(fault.help(format!("the slaves are {}", all.join(", "))))
+                }
             },
             [name, index, ref rest @ ..] if TABLES[SINGLE..].contains(&name) => match entry(root, name, index) {
                 Some(table) => put(table, rest, &set.node),
