@@ -1,5 +1,6 @@
 //! The tests of the whole, in one binary.
 
+mod cli;
 mod determinism;
 mod layers;
 mod support;
