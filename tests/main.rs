@@ -3,4 +3,6 @@
 mod cli;
 mod determinism;
 mod layers;
+mod props;
+mod startup;
 mod support;

@@ -7,13 +7,18 @@
 //!       t0                               T_DX
 //! ```
 //!
+//! The acyclic message is one service for a slave that starts up; where the mode has to be told, a Global_Control comes
+//! before it. A slave that gets on is served until it exchanges data, then the next one: from Set_Prm on its watchdog
+//! runs, and a cycle has time for one service only.
+//!
 //! | part | ends with | next part |
 //! |---|---|---|
 //! | Starting | token claimed | Spare, first SYNCH one T_DP later |
 //! | Spare | `Schedule` due | Clock: SYNCH on its way |
 //! | Clock | its last bit has left | Exchange with the first slave |
-//! | Exchange | answer or none after the repeats | Exchange with the next slave, Acyclic after the last |
-//! | Acyclic | answer, or end of a Global_Control | Gap |
+//! | Exchange | answer or none after the repeats | Exchange with the next slave, Control or Startup after the last |
+//! | Control | end of a Global_Control | Startup |
+//! | Startup | answer or none after the repeats | Gap |
 //! | Gap | answer or none | Spare, the token sent |
 //!
 //! A part that has nothing to do, or whose longest course would not end before the next SYNCH, is left out.
@@ -145,7 +150,8 @@ impl<A: Application> Master<A> {
             retries: 0,
             control_due: true,
             control_told: 0,
-            control_every: third.div_floor(settings.t_dp).max(1) as u64,
+            // Never in every cycle: slaves start up in the acyclic part too.
+            control_every: third.div_floor(settings.t_dp).max(2) as u64,
             startup_next: 0,
             settings,
         }
@@ -218,7 +224,7 @@ impl<A: Application> Master<A> {
     fn scheduled(&mut self, now: Local, out: &mut Outbox) {
         match self.part {
             Part::Spare => self.synch(now, out),
-            Part::Control => self.gap(out),
+            Part::Control => self.start_up(out),
             _ => {}
         }
     }
@@ -312,10 +318,14 @@ impl<A: Application> Master<A> {
         if control && self.fits(rate.octets(GC_OCTETS) + self.settings.bus.span(self.settings.bus.t_id2())) {
             return self.tell_mode(out);
         }
+        self.start_up(out);
+    }
+    /// One service for the next slave that does not exchange data yet, then the GAP.
+    fn start_up(&mut self, out: &mut Outbox) {
         let count = self.handlers.len();
         let slaves = (0..count).map(|i| (self.startup_next + i) % count);
         match slaves.into_iter().find(|&slave| !self.handlers[slave].exchanges()) {
-            Some(slave) => self.startup(slave, out),
+            Some(slave) => self.serve(slave, out),
             None => self.gap(out),
         }
     }
@@ -328,7 +338,7 @@ impl<A: Application> Master<A> {
         self.part = Part::Control;
         out.arm(Timer::Schedule, end);
     }
-    fn startup(&mut self, slave: usize, out: &mut Outbox) {
+    fn serve(&mut self, slave: usize, out: &mut Outbox) {
         let handler = &self.handlers[slave];
         let (saps, du, reply) = handler.service();
         let once = self.active.longest_cycle(SAP_FRAME_OCTETS + du.len(), SAP_FRAME_OCTETS + reply);
@@ -342,7 +352,6 @@ impl<A: Application> Master<A> {
         let request = Request { to: handler.params().address, service: Service::SrdHigh, saps: Some(saps), retries };
         self.active.request(self.active.free_at(), &request, du.len(), out, |to| to.copy_from_slice(du));
         self.part = Part::Startup(slave);
-        self.startup_next = slave + 1;
     }
     fn startup_answered(&mut self, slave: usize, confirm: Confirm<'_>, out: &mut Outbox) {
         let answer = match confirm {
@@ -351,11 +360,15 @@ impl<A: Application> Master<A> {
             Confirm::Acknowledged => Answer::Acknowledged,
             _ => Answer::Nothing,
         };
-        if self.handlers[slave].answered(answer, out) {
+        let handler = &mut self.handlers[slave];
+        let before = handler.state();
+        if handler.answered(answer, out) {
             self.app.joined(slave, true, out);
             // The newcomer has not heard the mode yet.
             self.control_due = true;
         }
+        let gets_on = self.handlers[slave].state() > before;
+        self.startup_next = if gets_on { slave } else { slave + 1 };
     }
 
     fn gap(&mut self, out: &mut Outbox) {
