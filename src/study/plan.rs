@@ -22,6 +22,8 @@ pub const TOKEN: Tbit = Tbit::of_octets(3);
 const STATUS_REQUEST: Tbit = Tbit::of_octets(6);
 /// Octets that a Data_Exchange telegram has around its data unit.
 const OVERHEAD: usize = 9;
+/// Octets that a telegram with SAPs has around its data unit.
+const SAP_OVERHEAD: usize = 11;
 
 /// One Data_Exchange in the cycle, seen at the master's plug, relative to t0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -78,6 +80,16 @@ impl Plan {
     /// What every T_DP must hold: the Data_Exchange, one GAP poll, one token, SYNCH (manual 3.3.2).
     pub fn content(&self) -> Span {
         self.t_dx + self.gap + self.token + self.synch
+    }
+    /// What T_DP must hold while `slave` starts up and all others exchange data: its Set_Prm of `octets`, which is its
+    /// longest service, one token, SYNCH. Model: D6, the service must end before SYNCH.
+    pub fn start_up(&self, scenario: &Scenario, slave: &Slave, octets: usize) -> Span {
+        let bus = &scenario.bus.params;
+        let own = self.slots.iter().find(|slot| slot.slave == slave.address);
+        let own = own.map_or(Span::ZERO, |slot| slot.reply_end - slot.request);
+        let set_prm = bus.rate.octets(SAP_OVERHEAD + octets);
+        let answer = (bus.span(bus.max_tsdr) + bus.rate.octets(SAP_OVERHEAD)).max(bus.span(bus.t_sl));
+        self.t_dx - own + set_prm + answer + self.token + self.synch
     }
     /// The shortest T_DP on the grid of `device` that holds the cycle and that the device allows (manual 3.3.2).
     pub fn t_dp_min(&self, device: &Profile) -> Span {

@@ -287,12 +287,7 @@ fn ratio(text: &str, unit: &str, kind: &Kind, more: &[&str]) -> Result<(i128, i1
     let unit = SPELLINGS.iter().find(|(other, _)| *other == unit).map_or(unit, |&(_, usual)| usual);
     kind.units.iter().find(|(name, _)| *name == unit).map(|&(_, ratio)| ratio).ok_or_else(|| {
         let names: Vec<_> = kind.units.iter().map(|&(name, _)| name).chain(more.iter().copied()).collect();
-        QuantityError::Unit {
-            text: text.into(),
-            found: found(unit),
-            noun: kind.noun,
-            units: names.join(", "),
-        }
+        QuantityError::Unit { text: text.into(), found: found(unit), noun: kind.noun, units: names.join(", ") }
     })
 }
 
