@@ -133,8 +133,12 @@ fn results_are_in_the_directory_of_the_scenario_and_nowhere_else() {
     assert_eq!(room.names("out"), BTreeSet::from(["scene".to_owned()]));
     let summary: serde_json::Value =
         serde_json::from_slice(&fs::read(room.path("out/scene/summary.json")).expect("a summary")).expect("JSON");
-    let named: BTreeSet<_> =
-        summary["files"].as_array().expect("a list").iter().map(|name| name.as_str().expect("a name").to_owned()).collect();
+    let named: BTreeSet<_> = summary["files"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|name| name.as_str().expect("a name").to_owned())
+        .collect();
     assert_eq!(room.names("out/scene"), named);
     assert!(page.ends_with(&format!("{} files in out/scene\n", named.len())), "{page}");
 }
@@ -143,7 +147,16 @@ fn results_are_in_the_directory_of_the_scenario_and_nowhere_else() {
 fn seed_out_and_set_do_what_they_say() {
     let room = Room::new();
     let page = room.runs(&[
-        "run", "scene.toml", "--seed", "9", "--out", "deep/results", "--set", "run.duration=100 ms", "--set", "slave.3.t_o=875 us",
+        "run",
+        "scene.toml",
+        "--seed",
+        "9",
+        "--out",
+        "deep/results",
+        "--set",
+        "run.duration=100 ms",
+        "--set",
+        "slave.3.t_o=875 us",
     ]);
     assert!(page.contains(" in 100 ms, seed 9\n"), "{page}");
     assert!(page.contains("T_O 875 us to 1 ms"), "{page}");
@@ -281,7 +294,7 @@ error: scene.toml:14:7: slave.3.t_o: T_O = 250 us is too early for slave 3
 error: scene.toml:12:8: master.t_dp: T_DP = 2 ms cannot hold the cycle of 87 slaves
   12 | t_dp = "2 ms"
      |        ^^^^^^
-  rule: T_DP >= T_DX 9.164 ms + GAP 95.167 us + token 9.083 us + Global_Control 18.25 us = 9.287 ms (manual 3.3.2)
+  rule: T_DP >= T_DX 9.167 ms + GAP 95.167 us + token 9.083 us + Global_Control 18.25 us = 9.289 ms (manual 3.3.2)
   help: the shortest is t_dp = "9.625 ms"
 "#,
     );
@@ -328,7 +341,10 @@ fn files_that_are_no_scenarios() {
         "this file is no UTF-8 text: octet FF in line 2\n  help: save it as UTF-8; a scenario is a text file",
     );
     room.write("zeros.toml", [0; 4_096]);
-    room.refuses(&["run", "zeros.toml"], "error: zeros.toml:1:4097: key with no value, expected `=`\n  rule: the file is TOML 1.0 (toml.io)");
+    room.refuses(
+        &["run", "zeros.toml"],
+        "error: zeros.toml:1:4097: key with no value, expected `=`\n  rule: the file is TOML 1.0 (toml.io)",
+    );
     room.write("...toml", SCENE);
     run(
         "...toml",
@@ -469,7 +485,8 @@ fn a_page_that_cannot_be_shown_is_told() {
     };
     let full = fs::File::options().write(true).open("/dev/full").expect("a full device");
     let output = call(full.into());
-    let expected = "error: the files are written, but the page cannot be shown: No space left on device (os error 28)\n";
+    let expected =
+        "error: the files are written, but the page cannot be shown: No space left on device (os error 28)\n";
     assert_eq!((text(&output.stderr), output.status.code()), (expected, Some(2)));
     // A reader that went away has seen enough.
     let (reader, writer) = std::io::pipe().expect("a pipe");
