@@ -77,6 +77,10 @@ impl Plan {
             synch: t_id1 + bus.span(SYNCH),
         }
     }
+    /// T_DX as Set_Prm says it and slaves check it: in whole units of 1/12 us, rounded up.
+    pub fn t_dx_told(&self) -> Span {
+        self.t_dx.ceil_to(Span::from_iso_units(1))
+    }
     /// What every T_DP must hold: the Data_Exchange, one GAP poll, one token, SYNCH (manual 3.3.2).
     pub fn content(&self) -> Span {
         self.t_dx + self.gap + self.token + self.synch
@@ -97,7 +101,7 @@ impl Plan {
     }
     /// Smallest T_O of `device` (manual 3.3.6, Model: D3).
     pub fn t_o_min(&self, device: &Profile) -> Span {
-        smallest_t_o(self.t_dx, device.t_o_min, device.io_grid())
+        smallest_t_o(self.t_dx_told(), device.t_o_min, device.io_grid())
     }
     /// Largest T_O of `slave` with its T_I in a cycle of `t_dp` (manual 3.3.5, Model: D3). Less than
     /// [`Self::t_o_min`] if there is none.
@@ -195,6 +199,17 @@ mod tests {
     fn t_o_exceeds_its_bound_strictly() {
         assert_eq!(smallest_t_o(Span::from_us(250), GRID, GRID), Span::from_us(500));
         assert_eq!(smallest_t_o(Span::from_us(250) - Span::from_ticks(1), GRID, GRID), Span::from_us(375));
+    }
+
+    /// A T_DX within the last 1/12 us before a point of the grid counts as that point, as the slave will see it.
+    #[test]
+    fn t_o_exceeds_the_t_dx_that_slaves_are_told() {
+        let device = find("posital-ocd-dpb1b").unwrap();
+        let mut plan = Plan::of(&network(BitRate::M12, device, 1));
+        plan.t_dx = Span::from_us(1_500) - Span::from_ticks(1);
+        assert_eq!((plan.t_dx_told(), plan.t_o_min(device)), (Span::from_us(1_500), Span::from_us(1_750)));
+        plan.t_dx = Span::from_us(1_500) - Span::from_iso_units(1);
+        assert_eq!((plan.t_dx_told(), plan.t_o_min(device)), (plan.t_dx, Span::from_us(1_625)));
     }
 
     #[test]

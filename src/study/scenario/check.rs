@@ -292,7 +292,7 @@ fn t_i_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn t_o_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let t_dx = facts.plan.t_dx;
+    let t_dx = facts.plan.t_dx_told();
     for slave in facts.scenario.configured() {
         let min = facts.plan.t_o_min(slave.device);
         if slave.times.t_o < min {
