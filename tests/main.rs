@@ -2,6 +2,8 @@
 
 mod cli;
 mod determinism;
+mod foreign;
+mod golden;
 mod layers;
 mod props;
 mod startup;
