@@ -5,6 +5,8 @@ mod determinism;
 mod foreign;
 mod golden;
 mod layers;
+mod manual;
 mod props;
+mod scenarios;
 mod startup;
 mod support;

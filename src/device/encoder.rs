@@ -1,16 +1,21 @@
 //! The absolute encoder of the manuals: code sequence, scaling, preset and the format of its position words.
 
+use crate::device::parameters::{DeviceIdentification, Parameters, Refused, SensorFormat};
 use crate::device::position::{CodeSequence, Position, Scaling};
 use crate::device::profile::Profile;
 use crate::device::sensor::Preset;
 use crate::device::unit::{Function, Unit};
 use crate::dp::slave::Refusal;
 use crate::time::Span;
+use crate::wire::Address;
+use crate::wire::acyclic::ErrorCode;
 use crate::wire::prm::{BlockType, SetPrm, UserPrm81};
 
 /// An absolute encoder on the bus.
 pub type Encoder = Unit<Disc>;
 
+/// P922 (manual 2.2).
+const TELEGRAM: u16 = 81;
 /// Absolute preset and relative shift. Model: D21; no parameter of these devices is writable.
 const PRESET: i32 = 0;
 
@@ -29,6 +34,12 @@ impl Disc {
     pub fn new(profile: &'static Profile) -> Self {
         let position = Position::new(profile.steps_per_rev, profile.revolutions, CodeSequence::Cw, None);
         Self { profile, position: position.expect("an unscaled disc breaks no rule") }
+    }
+
+    /// P964. Model: the manuals print no values, so the manufacturer is 0 and the firmware as old as the manual.
+    const fn identification(&self) -> DeviceIdentification {
+        let device_type = self.profile.ident;
+        DeviceIdentification { manufacturer: 0, device_type, firmware: 0x0101, year: 2007, day_month: 101, axes: 1 }
     }
 
     /// The position that these parameters ask for (manual 3.2).
@@ -83,6 +94,16 @@ impl Function for Disc {
     fn position(&self, raw: u32) -> (u32, u32) {
         let value = self.position.value(raw);
         (self.position.xist1(value), self.position.xist2(value))
+    }
+    fn parameters(&self, address: Address, request: &[u8], out: &mut [u8]) -> Result<usize, ErrorCode> {
+        let parameters = Parameters {
+            address,
+            telegram: TELEGRAM,
+            identification: self.identification(),
+            profile: Parameters::PROFILE,
+            format: SensorFormat::of(&self.position),
+        };
+        parameters.answer(request, out).map_err(|Refused(code)| code)
     }
     fn preset(&mut self, preset: Preset, raw: u32) {
         match preset {

@@ -133,7 +133,7 @@ impl Isochronous {
             error: judgement.error,
             period: self.pll.period(),
             window: self.pll.window(),
-            counter: self.pll.failures(),
+            counter: judgement.counter,
         });
         self.observe_pll(before, out);
         match self.pll.window_end() {

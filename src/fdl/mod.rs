@@ -146,11 +146,13 @@ pub enum Timer {
     Window,
     /// T_O.
     SetPoint,
+    /// The LEDs may change because nothing was heard.
+    Leds,
 }
 
 impl Timer {
     /// Every timer, in the order of their numbers.
-    pub const ALL: [Self; 5] = [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint];
+    pub const ALL: [Self; 6] = [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint, Self::Leds];
 }
 
 /// A station's answer to one input. Reused from step to step, so that no step allocates.

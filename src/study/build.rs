@@ -20,6 +20,7 @@ use crate::study::scenario::{self, Action, CodeSequence, Scenario, Slave, When};
 use crate::time::{Local, Span, Time};
 use crate::wire::Address;
 use crate::wire::drive::G1Stw;
+use crate::wire::parameter::ParameterAddress;
 use crate::wire::prm::{DpV1Status, DxbLink, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81};
 
 /// Group 8, the clock's (Set_Prm octet 7).
@@ -170,10 +171,8 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
 
 fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let settings = UnitSettings {
-        address: slave.address,
-        rate: scenario.bus.params.rate,
-        t_sdr: slave.t_sdr,
         clock_tolerance: slave.clock_tolerance,
+        ..UnitSettings::new(slave.address, scenario.bus.params.rate, slave.t_sdr)
     };
     let machine = if slave.silent {
         Node::Silent(slave.address)
@@ -216,6 +215,18 @@ fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Ac
     match action {
         Action::PowerOff => to_slaves(Act::PowerOff),
         Action::PowerOn => to_slaves(Act::PowerOn),
+        Action::ReadParameter { parameter, subindex, elements } => for_slaves(&|slave| {
+            let address = ParameterAddress { attribute: ParameterAddress::VALUE, elements, pnu: parameter, subindex };
+            controller::Command::ReadParameter(slave, address)
+        }),
+        Action::ChangeParameter { parameter, subindex, format, value } => for_slaves(&|slave| {
+            let address =
+                ParameterAddress { attribute: ParameterAddress::VALUE, elements: 1, pnu: parameter, subindex };
+            controller::Command::ChangeParameter(slave, address, format, value)
+        }),
+        Action::Startup { telegram, patch } => {
+            slaves.iter().map(|&slave| (master, Act::Command(Command::Patch(slave, telegram, patch)))).collect()
+        }
         Action::Clear => vec![(master, Act::Command(Command::Mode(MasterMode::Clear)))],
         Action::Operate => vec![(master, Act::Command(Command::Mode(MasterMode::Operate)))],
         Action::Acknowledge => for_slaves(&controller::Command::Acknowledge),

@@ -296,7 +296,16 @@ impl Watch {
         let row = &mut self.row;
         match *what {
             Observation::SlaveState { to, .. } => row.state = to,
-            Observation::Phase { to, .. } => row.phase = to,
+            Observation::Phase { to, .. } => {
+                row.phase = to;
+                // Nothing is compared at T_O without a clock, and the own sign of life stands at 0.
+                if to < Phase::MasterLife {
+                    (row.mls, row.sls) = (0, 0);
+                }
+                if to == Phase::Configuration {
+                    (row.life_counter, row.clock_counter) = (0, 0);
+                }
+            }
             Observation::Pll { to, .. } => {
                 row.pll = to;
                 if matches!(to, PllState::Idle | PllState::Waiting) {
@@ -463,6 +472,22 @@ mod tests {
         assert_eq!(kept.slaves[0].latch_offset, Some(Span::from_ns(875_000) - Span::from_ticks(10_498_951)));
         // Nominal t0(1) is at 999 900.01 ns: 11 998 800.12 ticks, 11 998 801.
         assert_eq!(kept.cycles[1].gc_jitter, Span::from_ticks(-1));
+    }
+
+    #[test]
+    fn signs_of_life_end_with_the_clock_and_counters_with_data_exchange() {
+        let phase = |from, to| Observation::Phase { from, to };
+        let mut told = Told::new(0);
+        told.cycle(0, 0);
+        told.tell(500_000, 3, Observation::SetPoint { mls: 6, sls: 9, counter: 10, expected: false });
+        told.cycle(1_000_000, 1);
+        told.tell(1_000_020, 3, phase(Phase::Operation, Phase::Clock));
+        told.cycle(2_000_000, 2);
+        told.tell(2_100_000, 3, phase(Phase::Clock, Phase::Configuration));
+        let (_, kept) = told.over(3_000_000);
+        let rows = kept.slaves.iter().filter(|row| row.slave == address(3));
+        let values: Vec<_> = rows.map(|row| (row.mls, row.sls, row.life_counter)).collect();
+        assert_eq!(values, [(6, 9, 10), (0, 0, 10), (0, 0, 0)]);
     }
 
     #[test]

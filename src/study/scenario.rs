@@ -17,12 +17,14 @@ mod tree;
 pub use error::{Fault, Position, Problem, ScenarioError};
 
 use crate::device::profile::Profile;
+pub use crate::dp::handler::{Patch, StartupTelegram};
 use crate::fdl::params::BusParams;
 pub use crate::sim::fault::{Bursts, Disturbance, Service};
 use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
+pub use crate::wire::parameter::Format;
 use section::Reader;
 use std::fs::File;
 use std::io::Read;
@@ -399,6 +401,33 @@ pub enum Action {
     ControlWord {
         /// The word.
         value: u16,
+    },
+    /// The master application reads a parameter over the parameter channel (manual 4).
+    ReadParameter {
+        /// Parameter number.
+        parameter: u16,
+        /// First element.
+        subindex: u16,
+        /// How many elements; 0 for a parameter that is no array.
+        elements: u8,
+    },
+    /// The master application tries to change a parameter.
+    ChangeParameter {
+        /// Parameter number.
+        parameter: u16,
+        /// The element.
+        subindex: u16,
+        /// Format of the value.
+        format: Format,
+        /// The value.
+        value: u32,
+    },
+    /// The master starts the slaves anew, with Set_Prm or Chk_Cfg changed; without changes with the good one.
+    Startup {
+        /// Which telegram.
+        telegram: StartupTelegram,
+        /// What is changed.
+        patch: Patch,
     },
     /// The supply of the slaves goes off.
     PowerOff,

@@ -35,9 +35,9 @@ pub struct LinkLatencies {
 /// Everything counted that the pictures show.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Distributions {
-    /// Latch skew per cycle [ns].
+    /// Latch skew per cycle (ns).
     pub latch_skew: Distribution,
-    /// Length of each cycle minus the nominal T_DP [ns].
+    /// Length of each cycle minus the nominal T_DP (ns).
     pub t_dp_deviation: Distribution,
     /// Per link.
     pub links: Vec<LinkLatencies>,

@@ -106,14 +106,13 @@ impl World {
         let fault = index == 1 && (700..760).contains(&cycle);
         let (phase, pll) = match (age, fault) {
             (None, _) => (Phase::Configuration, PllState::Idle),
-            (_, true) => (Phase::Clock, PllState::Narrowing),
-            (Some(0..=27), _) => (Phase::Clock, PllState::Narrowing),
+            (_, true) | (Some(0..=27), _) => (Phase::Clock, PllState::Narrowing),
             (Some(28..=45), _) => (Phase::MasterLife, PllState::Locked),
             (Some(46..=63), _) => (Phase::SlaveLife, PllState::Locked),
             _ => (Phase::Operation, PllState::Locked),
         };
         let settled = (16_000 >> (age.unwrap_or(0) / 2).min(12)) * 12;
-        let sign = if index % 2 == 0 { 1 } else { -1 };
+        let sign = if index.is_multiple_of(2) { 1 } else { -1 };
         let error = sign * settled + self.noise(15 * 12);
         let window = (4_000i64 >> (age.unwrap_or(0) / 4).min(8)).max(1_000) * 12;
         self.plots.slave(&SlaveRow {

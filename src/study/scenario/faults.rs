@@ -902,6 +902,9 @@ fn every_kind_can_be_read() {
         let value = match kind.name {
             "jump-life-sign" => "to = 9",
             "control-word" => "value = 0x2000",
+            "read-parameter" => "parameter = 979\nelements = 6",
+            "change-parameter" => "parameter = 918\nvalue = 7",
+            "set-prm" => "octets = [[24, 0x05], [16, 255]]\nlength = 58",
             _ => "",
         };
         let event = format!("at = \"1 s\"\ndo = \"{}\"\n{about}\n{value}\n\n[[disturbance]]", kind.name);

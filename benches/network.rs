@@ -1,0 +1,95 @@
+//! What a slave-cycle of the whole network costs, against the straight loop of the same arithmetic and octets.
+//!
+//! ```text
+//! cargo bench --bench network             medians [ns per slave-cycle] and their ratio
+//! cargo bench --bench network -- --test   one short round, only to see that it runs
+//! ```
+//!
+//! | column | what runs |
+//! |---|---|
+//! | network | events, bus, stations; rows and histograms of every cycle |
+//! | loop | the straight loop with octets, see [`straight`] |
+//! | ratio | network over loop |
+//! | bare | the network with nobody who reads it |
+//! | prints | the network with its fingerprints instead of histograms |
+//!
+//! Every network is in operation before the time is taken, and the loop's results are compared with the network's.
+
+mod straight;
+
+use isodp::device::node::Node;
+use isodp::sim::fingerprint::Fingerprints;
+use isodp::sim::motion::Shaft;
+use isodp::sim::network::{Network, Until};
+use isodp::sim::record::Recorder;
+use isodp::study::histogram::Histograms;
+use isodp::study::metric::{Metrics, Shafts};
+use isodp::study::run;
+use isodp::study::scenario::Scenario;
+use isodp::time::Time;
+use isodp::wire::Address;
+use straight::effort::Effort;
+use straight::{check, encoders};
+
+/// The shafts of a scenario's encoders with their counts per revolution, in address order.
+struct Speeds {
+    first: u8,
+    shafts: Vec<(Shaft, f64)>,
+}
+impl Speeds {
+    fn of(scenario: &Scenario) -> Self {
+        let shaft = |motion| Shaft::new(motion).expect("a checked motion");
+        let shafts = scenario.slaves.iter().map(|slave| (shaft(&slave.motion), slave.device.steps_per_rev.into()));
+        Self { first: scenario.slaves[0].address.get(), shafts: shafts.collect() }
+    }
+}
+impl Shafts for Speeds {
+    fn speed(&self, slave: Address, at: Time) -> f64 {
+        let (shaft, counts) = &self.shafts[usize::from(slave.get() - self.first)];
+        shaft.speed(at) * counts
+    }
+}
+
+/// A network in operation with what reads it.
+struct Watched<R> {
+    network: Network<Node>,
+    recorder: R,
+}
+impl<R: Recorder> Watched<R> {
+    fn new(scenario: &Scenario, recorder: R) -> Self {
+        Self { network: encoders::started(scenario).0, recorder }
+    }
+    fn run(&mut self, cycles: u64) {
+        let until = Until::Cycle(self.network.cycles() + cycles - 1);
+        self.network.run(until, u64::MAX, &mut self.recorder);
+    }
+}
+
+fn main() {
+    let effort = Effort::of_arguments();
+    println!("encoders      T_DP   network [ns]   loop [ns]   ratio   bare [ns]   prints [ns]");
+    for number in [1, 8, 32, 122] {
+        check::same_results(number, effort.compared);
+        let scenario = encoders::scenario(number);
+        let (network, start) = encoders::started(&scenario);
+        let mut straight = check::caught_up::<true>(&scenario, &network, &start);
+        let layout = run::layout(&scenario);
+        let metrics = Metrics::new(layout.clone(), Speeds::of(&scenario), Histograms::new(&layout));
+        let mut full = Watched { network, recorder: metrics };
+        let mut bare = Watched::new(&scenario, ());
+        let mut prints = Watched::new(&scenario, Fingerprints::default());
+        let [full, straight, bare, prints] = effort.medians(
+            number,
+            [
+                &mut |cycles| full.run(cycles),
+                &mut |cycles| straight.run(cycles, &mut ()),
+                &mut |cycles| bare.run(cycles),
+                &mut |cycles| prints.run(cycles),
+            ],
+        );
+        let (t_dp, ratio) = (scenario.master.t_dp.to_string(), full / straight);
+        println!(
+            "{number:>8}  {t_dp:>8}   {full:>12.1}   {straight:>9.1}   {ratio:>5.2}   {bare:>9.1}   {prints:>11.1}"
+        );
+    }
+}
