@@ -270,13 +270,12 @@ fn pictures_are_well_formed_and_say_what_they_show() {
         let picture = fs::read_to_string(&path).expect("a picture");
         let document =
             roxmltree::Document::parse(&picture).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        let root = document.root_element();
-        assert_eq!(root.tag_name().name(), "svg");
-        let size = |key: &str| root.attribute(key).and_then(|size| size.parse::<f64>().ok()).expect("a size");
+        let svg = document.root_element();
+        assert_eq!(svg.tag_name().name(), "svg");
+        let size = |key: &str| svg.attribute(key).and_then(|size| size.parse::<f64>().ok()).expect("a size");
         assert!(size("width") > 100.0 && size("height") > 100.0);
-        let texts = document
-            .descendants()
-            .filter(|node| node.has_tag_name((root.tag_name().namespace().unwrap_or(""), "text")));
+        let texts =
+            document.descendants().filter(|node| node.has_tag_name((svg.tag_name().namespace().unwrap_or(""), "text")));
         let lines: Vec<String> = texts.map(|node| node.text().unwrap_or_default().trim().to_owned()).collect();
         assert!(lines.iter().any(|line| line.contains(name)), "{}: {lines:?}", path.display());
         assert!(!picture.contains("NaN"), "{}", path.display());
