@@ -100,6 +100,11 @@ impl Table {
     }
 }
 
+/// Whether this is a hexadecimal word, `0x1000`.
+fn is_word(cell: &str) -> bool {
+    cell.strip_prefix("0x").is_some_and(|word| u16::from_str_radix(word, 16).is_ok())
+}
+
 fn near(one: f64, other: f64, what: &str) {
     assert!((one - other).abs() <= 0.002 + other.abs() * 1e-9, "{what}: {one} and {other}");
 }
@@ -119,13 +124,9 @@ fn tables_have_a_row_per_cycle_and_numbers_in_their_cells() {
             let cells = cells.iter().filter(|cell| !cell.is_empty());
             match name.as_str() {
                 "state" | "phase" | "pll" | "leds" | "event" => {
-                    assert!(cells.clone().all(|cell| cell.parse::<f64>().is_err()));
+                    assert!(cells.clone().all(|cell| cell.parse::<f64>().is_err()))
                 }
-                "g1_zsw" => {
-                    assert!(cells.clone().all(|cell| {
-                        cell.strip_prefix("0x").is_some_and(|word| u16::from_str_radix(word, 16).is_ok())
-                    }));
-                }
+                "g1_zsw" => assert!(cells.clone().all(|cell| is_word(cell)), "{file}: {name}"),
                 _ => assert!(cells.clone().all(|cell| cell.parse::<f64>().is_ok()), "{file}: {name}"),
             }
             assert!(cells.count() > 0, "{file}: {name} is empty");
@@ -261,25 +262,25 @@ fn pictures_are_well_formed_and_say_what_they_show() {
     let name = "R&D <1> \"x\" 'y'";
     room.write(&format!("{name}.toml"), SCENE);
     room.runs(&["run", &format!("{name}.toml")]);
-    let mut pictures = 0;
+    let mut count = 0;
     for entry in fs::read_dir(room.path("out").join(name)).expect("results") {
         let path = entry.expect("an entry").path();
         if path.extension().is_none_or(|extension| extension != "svg") {
             continue;
         }
-        pictures += 1;
-        let text = fs::read_to_string(&path).expect("a picture");
-        let document = roxmltree::Document::parse(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        let picture = document.root_element();
-        assert_eq!(picture.tag_name().name(), "svg");
-        let size = |key: &str| picture.attribute(key).and_then(|size| size.parse::<f64>().ok()).expect("a size");
+        count += 1;
+        let picture = fs::read_to_string(&path).expect("a picture");
+        let document =
+            roxmltree::Document::parse(&picture).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let svg = document.root_element();
+        assert_eq!(svg.tag_name().name(), "svg");
+        let size = |key: &str| svg.attribute(key).and_then(|size| size.parse::<f64>().ok()).expect("a size");
         assert!(size("width") > 100.0 && size("height") > 100.0);
-        let texts = document
-            .descendants()
-            .filter(|node| node.has_tag_name((picture.tag_name().namespace().unwrap_or(""), "text")));
-        let texts: Vec<String> = texts.map(|node| node.text().unwrap_or_default().trim().to_owned()).collect();
-        assert!(texts.iter().any(|text| text.contains(name)), "{}: {texts:?}", path.display());
-        assert!(!text.contains("NaN"), "{}", path.display());
+        let texts =
+            document.descendants().filter(|node| node.has_tag_name((svg.tag_name().namespace().unwrap_or(""), "text")));
+        let lines: Vec<String> = texts.map(|node| node.text().unwrap_or_default().trim().to_owned()).collect();
+        assert!(lines.iter().any(|line| line.contains(name)), "{}: {lines:?}", path.display());
+        assert!(!picture.contains("NaN"), "{}", path.display());
     }
-    assert_eq!(pictures, 7);
+    assert_eq!(count, 7);
 }

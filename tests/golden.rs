@@ -47,7 +47,7 @@ fn portrait(scenario: &Scenario) -> String {
 
 /// Events of one kind.
 struct Kind {
-    same: (Discriminant<Observation>, Option<u16>),
+    of: (Discriminant<Observation>, Option<u16>),
     first: EventRow,
     last: Time,
     count: u64,
@@ -58,10 +58,10 @@ fn kinds(events: &[EventRow]) -> Vec<Kind> {
     let mut kinds: Vec<Kind> = Vec::new();
     for event in events {
         let code = if let Observation::Fault { code } = event.what { Some(code) } else { None };
-        let same = (discriminant(&event.what), code);
-        match kinds.iter_mut().find(|known| known.same == same) {
+        let of = (discriminant(&event.what), code);
+        match kinds.iter_mut().find(|known| known.of == of) {
             Some(known) => (known.last, known.count) = (event.at, known.count + 1),
-            None => kinds.push(Kind { same, first: *event, last: event.at, count: 1 }),
+            None => kinds.push(Kind { of, first: *event, last: event.at, count: 1 }),
         }
     }
     kinds
