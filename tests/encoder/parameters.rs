@@ -103,10 +103,10 @@ fn section_3_1_set_prm_of_another_length_is_refused() {
 
 #[test]
 fn section_3_1_another_ident_or_a_reserved_bit_is_refused() {
-    for (octet, value) in [(5, 0x07), (6, 0xDE), (1, 0x89), (1, 0x8A), (1, 0x8C), (8, 0xC8), (8, 0xD0), (8, 0xC1)] {
+    for (octet, value) in [(5, 0x07), (6, 0xDE), (1, 0x89), (1, 0x8A), (1, 0x8C), (8, 0xC8), (8, 0xD0)] {
         refused(&prm(&[(octet, value)]), &format!("octet {octet} is {value:02X}"));
     }
-    for (octet, value) in [(8, 0xC2), (9, 0x02), (10, 0x38), (10, 0x58), (2, 0), (3, 0)] {
+    for (octet, value) in [(9, 0x02), (10, 0x38), (10, 0x58), (2, 0), (3, 0)] {
         refused(&prm(&[(octet, value)]), &format!("octet {octet} is {value:02X}"));
     }
     // "Currently not used" (manual 3.1): octet 15 bits 2 and 4 to 7, octets 25 to 31.
@@ -177,7 +177,7 @@ fn section_3_1_without_isochronous_mode_the_encoder_runs_freely() {
 #[test]
 fn section_3_2_1_code_sequence_turns_the_direction_if_enabled() {
     // Octet 15, position of 1000 steps clockwise. Bit 0 without bit 1 changes nothing (manual 3.2.2).
-    for (options, xist2) in [(0x00, 1_000), (0x01, 1_000), (0x02, 1_000), (0x03, (1 << 25) - 1_000)] {
+    for (options, xist2) in [(0x00, 1_000), (0x01, 1_000), (0x02, 1_000), (0x03, (1 << 25) - 1 - 1_000)] {
         let mut rig = Rig::exchanging(&prm(&[(15, options), (49, 3)]));
         rig.raw = 1_000;
         assert_eq!(rig.cycle(0, 0x2000).xist2, xist2, "octet 15 is {options:02X}");
@@ -325,7 +325,7 @@ fn section_3_3_8_a_window_below_1_us_is_raised_silently() {
     // What the clock recovery ends with (1/12 us).
     for (asked, taken) in [(1, 12), (11, 12), (12, 12), (13, 13), (240, 240)] {
         let mut rig = Rig::exchanging(&prm(&u16_at(56, asked)));
-        (0..40).for_each(|_| drop(rig.cycle(0, 0)));
+        super::start_up::repeat(40, || rig.cycle(0, 0));
         let last = rig.seen.iter().rev().find_map(|what| match *what {
             Observation::Clock { verdict: ClockVerdict::Hit, window, .. } => Some(window),
             _ => None,
