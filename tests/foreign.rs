@@ -124,7 +124,7 @@ fn tables_have_a_row_per_cycle_and_numbers_in_their_cells() {
             let cells = cells.iter().filter(|cell| !cell.is_empty());
             match name.as_str() {
                 "state" | "phase" | "pll" | "leds" | "event" => {
-                    assert!(cells.clone().all(|cell| cell.parse::<f64>().is_err()))
+                    assert!(cells.clone().all(|cell| cell.parse::<f64>().is_err()));
                 }
                 "g1_zsw" => assert!(cells.clone().all(|cell| is_word(cell)), "{file}: {name}"),
                 _ => assert!(cells.clone().all(|cell| cell.parse::<f64>().is_ok()), "{file}: {name}"),

@@ -65,6 +65,9 @@ const fn exchanging(kind: Kind) -> [(Kind, SlaveState); 3] {
     [(Rs, WaitPrm), (Rs, WaitCfg), (kind, DataExch)]
 }
 
+/// A name, what is asked, and the kind of answer before and after.
+type Try<'a> = (&'a str, &'a dyn Fn(&mut Rig) -> Reply, [Kind; 2]);
+
 #[test]
 fn section_2_1_1_states_and_telegrams_of_the_start_up() {
     let try_ = |name, input, expected| Try { name, input, expected };
@@ -111,7 +114,7 @@ fn section_2_states_and_telegrams_of_data_exchange() {
 #[test]
 fn section_2_1_1_another_master_changes_nothing() {
     let other = |rig: &mut Rig, saps, du: &[u8]| rig.srd_from(STRANGER, saps, du);
-    let tries: [(&str, &dyn Fn(&mut Rig) -> Reply, [Kind; 2]); 10] = [
+    let tries: [Try<'_>; 10] = [
         ("Set_Prm", &|rig| other(rig, SET_PRM, &PRM), [Rs, Rs]),
         ("bad Set_Prm", &|rig| other(rig, SET_PRM, &PRM[..9]), [Rs, Rs]),
         ("Unlock", &|rig| other(rig, SET_PRM, &prm(&[(1, 0x40)])), [Rs, Rs]),

@@ -59,6 +59,9 @@ fn with_t_mapc(n: u8) -> Vec<u8> {
     prm(&[(43, n)])
 }
 
+/// A name and what is done.
+type Way = (&'static str, fn(&mut Rig));
+
 #[test]
 fn section_2_1_2_the_clock_starts_with_operate_and_data_and_is_locked_after_17_synchs() {
     let mut rig = Rig::exchanging(&PRM);
@@ -209,7 +212,7 @@ fn section_2_1_2_a_lost_clock_is_fault_0f04_in_each_later_phase_and_everything_b
 #[test]
 fn section_2_1_1_every_phase_ends_with_data_exchange() {
     for phase in [Clock, MasterLife, SlaveLife, Operation] {
-        let ways: [(&str, fn(&mut Rig)); 5] = [
+        let ways: [Way; 5] = [
             ("watchdog", |rig| rig.advance(rig.now + T_DP * 101)),
             ("unlock", |rig| drop(rig.srd(SET_PRM, &prm(&[(1, 0x40)])))),
             ("new parameters", |rig| drop(rig.srd(SET_PRM, &PRM))),
