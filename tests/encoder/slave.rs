@@ -66,7 +66,7 @@ const fn exchanging(kind: Kind) -> [(Kind, SlaveState); 3] {
 }
 
 /// A name, what is asked, and the kind of answer before and after.
-type Try<'a> = (&'a str, &'a dyn Fn(&mut Rig) -> Reply, [Kind; 2]);
+type Asked<'a> = (&'a str, &'a dyn Fn(&mut Rig) -> Reply, [Kind; 2]);
 
 #[test]
 fn section_2_1_1_states_and_telegrams_of_the_start_up() {
@@ -114,7 +114,7 @@ fn section_2_states_and_telegrams_of_data_exchange() {
 #[test]
 fn section_2_1_1_another_master_changes_nothing() {
     let other = |rig: &mut Rig, saps, du: &[u8]| rig.srd_from(STRANGER, saps, du);
-    let tries: [Try<'_>; 10] = [
+    let tries: [Asked<'_>; 10] = [
         ("Set_Prm", &|rig| other(rig, SET_PRM, &PRM), [Rs, Rs]),
         ("bad Set_Prm", &|rig| other(rig, SET_PRM, &PRM[..9]), [Rs, Rs]),
         ("Unlock", &|rig| other(rig, SET_PRM, &prm(&[(1, 0x40)])), [Rs, Rs]),
