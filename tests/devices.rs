@@ -33,7 +33,10 @@ fn one_device_is_told_in_full() {
     for profile in PROFILES {
         let (code, all, _) = devices(&[profile.name]);
         assert_eq!(code, Some(0));
-        assert!(all.starts_with(&format!("{}: {}\n", profile.name, profile.title)) && all.contains(profile.source), "{all}");
+        assert!(
+            all.starts_with(&format!("{}: {}\n", profile.name, profile.title)) && all.contains(profile.source),
+            "{all}"
+        );
         for parameter in PARAMETERS {
             assert_eq!(all.contains(&format!("P{}", parameter.pnu)), profile.publisher, "{all}");
         }

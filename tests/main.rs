@@ -4,5 +4,6 @@ mod determinism;
 mod devices;
 mod layers;
 mod manual;
+mod options;
 mod scenarios;
 mod support;

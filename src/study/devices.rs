@@ -17,7 +17,8 @@ pub struct UnknownDevice {
 
 /// All devices: their limits and the longest answer times.
 pub fn list() -> String {
-    let header = ["name", "ident", "in", "out", "T_DP", "T_I from", "T_O - T_DX over", "T_PLL_W to", "resolution", "function"];
+    let header =
+        ["name", "ident", "in", "out", "T_DP", "T_I from", "T_O - T_DX over", "T_PLL_W to", "resolution", "function"];
     let rows: Vec<_> = PROFILES.iter().map(limits).collect();
     let mut lines = aligned(&header, &[0, 9], &rows);
 
