@@ -1,5 +1,6 @@
 //! The command line `isodp`.
 
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -59,7 +60,7 @@ struct RunArgs {
     #[arg(value_name = "FILE")]
     scenario: PathBuf,
     /// Seed of all random streams, instead of the scenario's.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Directory for the results; they go to DIR/<scenario>/.
     #[arg(long, value_name = "DIR", default_value = "out")]
@@ -76,20 +77,33 @@ fn assignment(text: &str) -> Result<(String, String), String> {
     }
 }
 
+fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("a seed is a whole number from 0 to {}", u64::MAX))
+}
+
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(args) => run_command(args),
         Command::Devices(args) => devices_command(args.name.as_deref()),
     };
-    match result {
-        Ok(text) => {
-            anstream::print!("{text}");
-            ExitCode::SUCCESS
-        }
+    match result.and_then(|page| show(&page)) {
+        Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            anstream::eprintln!("error: {error}");
+            // Where standard error is gone too, the exit code is all that can be told.
+            let _ = writeln!(anstream::stderr(), "error: {error}");
             ExitCode::from(USAGE)
         }
+    }
+}
+
+/// Prints `page`. A reader that has seen enough and closes its end is fine.
+fn show(page: &str) -> Result<(), Box<dyn std::error::Error>> {
+    let mut out = anstream::stdout();
+    match out.write_all(page.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(format!("the files are written, but the page cannot be shown: {error}").into())
+        }
+        _ => Ok(()),
     }
 }
 

@@ -99,6 +99,10 @@ fn the_value_bit_follows_the_request_where_the_make_wants_it() {
 
 #[test]
 fn a_preset_sets_its_value_and_can_be_switched_off() {
+    // Octet 15 bit 1 enables presets (manual 3.2.2).
+    let commanded = |slave: &str, words: &[(u64, u16)]| {
+        self::commanded(&format!("functions = true\nt_i = \"375 us\"\n{slave}"), words)
+    };
     let xist1 = |slave: &str| last(&commanded(slave, &[(200, 0x1000)])).xist1;
     // 8192 x 4096 steps, shifted left by 7; half a revolution is 4096 steps.
     assert_eq!(last(&with("")).xist1, 4_096 << 7);
@@ -154,7 +158,7 @@ fn the_gains_decide_what_is_left_of_a_frequency_error() {
 fn a_coarse_timer_latches_at_coarse_instants() {
     let spread = |slave: &str| {
         let run = with(slave);
-        let offsets: Vec<_> = run.slave(3).filter_map(|row| row.latch_offset).map(|offset| offset.as_us()).collect();
+        let offsets: Vec<_> = run.slave(3).filter_map(|row| row.latch_offset).map(isodp::time::Span::as_us).collect();
         let settled = &offsets[offsets.len() - 200..];
         settled.iter().copied().fold(f64::MIN, f64::max) - settled.iter().copied().fold(f64::MAX, f64::min)
     };

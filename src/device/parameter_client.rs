@@ -129,7 +129,9 @@ fn tell(asked: &Asked, data: &[u8], out: &mut Outbox) {
             continue;
         }
         for at in 0..values.count() {
-            if let Some(value) = values.unsigned(at) {
+            // P965 is a string whose octets are elements.
+            let octet = values.data.get(at).filter(|_| values.format == Format::OctetString);
+            if let Some(value) = values.unsigned(at).or(octet.map(|&octet| octet.into())) {
                 out.observe(Observation::ParameterValue { slave, pnu, subindex: subindex + at as u16, value });
             }
         }

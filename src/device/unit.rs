@@ -9,7 +9,7 @@ use crate::device::isochronous::{IsoSettings, Isochronous};
 use crate::device::leds::{LedInput, LedLogic};
 use crate::device::options::UnitOptions;
 use crate::device::profile::Profile;
-use crate::device::sensor::{Answer, Fault, Faults, Preset, Sensor, Xist1, Xist2};
+use crate::device::sensor::{Answer, Fault, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
 use crate::dp::ms1::Records;
 use crate::dp::slave::{Application, Identity, Refusal, Slave};
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
@@ -31,7 +31,8 @@ pub trait Function {
     fn parameterise(&mut self, prm: &SetPrm<'_>, watchdog: Option<Span>);
     /// Tolerated failures of the master's sign of life that these parameters ask for (manual 3.2.5).
     fn max_failures(prm: &SetPrm<'_>) -> u8;
-    /// Whether these parameters switch on what takes the longer computing time (manual 3.2.2).
+    /// Whether these parameters enable scaling, preset and code sequence, which take the longer computing time (manual
+    /// 3.2.2).
     fn slow(prm: &SetPrm<'_>) -> bool;
     /// G1_XIST1 and the right-justified position for G1_XIST2 at this raw position (steps).
     fn position(&self, raw: u32) -> (u32, u32);
@@ -236,6 +237,7 @@ impl<F: Function> Body<F> {
         let (t_dp, latch, set_point) = (iso.t_dp_units(), iso.t_i_units(), iso.t_o_units());
         let earliest = u64::from(iso.t_dx) + units(self.profile.t_o_min);
         let gap = units(self.profile.gap_min(slow));
+        let window = u64::from(iso.t_pll_w).max(units(self.profile.min_window));
         let range = units(self.profile.t_dp_min)..=units(self.profile.t_dp_max);
         let rules = [
             (9, t_dp, range.contains(&t_dp), "T_DP [1/12 us] is within the device's range (manual 3.3.2)"),
@@ -259,6 +261,12 @@ impl<F: Function> Body<F> {
                 u64::from(iso.t_pll_w),
                 iso.t_pll_w <= self.profile.t_pll_w_max,
                 "T_PLL_W [1/12 us] is not above T_PLL_W_MAX (GSD)",
+            ),
+            (
+                26,
+                u64::from(iso.t_pll_d),
+                u64::from(iso.t_pll_d) + window < latch,
+                "T_PLL_D [1/12 us] leaves the delayed latch before the next clock (manual 3.3.9, Model: D13)",
             ),
         ];
         match rules.into_iter().find(|&(.., good, _)| !good) {
@@ -338,6 +346,8 @@ impl<F: Function> Application for Body<F> {
         self.iso = iso
             .and_then(|block| IsoM::parse(&block).ok())
             .map(|iso| Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), &self.settings.options)));
+        let preset_enabled = self.settings.options.sensor.preset_enabled && F::slow(prm);
+        self.sensor = Sensor::new(SensorOptions { preset_enabled, ..self.settings.options.sensor });
         self.function.parameterise(prm, watchdog);
     }
     fn enter(&mut self, _now: Local, out: &mut Outbox) {
@@ -355,6 +365,8 @@ impl<F: Function> Application for Body<F> {
             iso.exchanged(out);
         }
         if !self.is_locked() {
+            // A preset is about the position that this reply carries.
+            self.raw = sample;
             self.take_over(out);
             self.latch(sample, false, out);
         }

@@ -109,8 +109,12 @@ fn serve(pdu: &[u8], records: &mut impl Records, out: &mut [u8; MAX_PDU]) -> usi
         // A function that this server has not, or a PDU that is none.
         _ => {
             let function = pdu.first().copied().and_then(|code| Function::from_code(code & 0x7F));
-            let function = function.unwrap_or(Function::Idle);
-            Response::Negative(Negative::new(function, ErrorCode::NOT_SUPPORTED))
+            let code = match function {
+                // Its length octet does not count the data that follow.
+                Some(Function::Write) => ErrorCode::WRITE_LENGTH,
+                _ => ErrorCode::NOT_SUPPORTED,
+            };
+            Response::Negative(Negative::new(function.unwrap_or(Function::Idle), code))
         }
     };
     response.emit(out).unwrap_or(0)
@@ -278,6 +282,8 @@ mod tests {
         for (pdu, answer) in [
             (&[0x5E, 1, 9, 240][..], [0xDE, 0x80, 0xB0, 0]),
             (&[0x5F, 2, 47, 1, 0], [0xDF, 0x80, 0xB2, 0]),
+            (&[0x5F, 1, 47, 2, 0], [0xDF, 0x80, 0xB1, 0]),
+            (&[0x5F, 1], [0xDF, 0x80, 0xB1, 0]),
             (&[0x51, 1, 47, 1, 0], [0xD1, 0x80, 0xA9, 0]),
         ] {
             let mut server = Server::new(Span::ZERO);

@@ -82,7 +82,7 @@ fn user_block(slave: &Slave) -> UserPrm81 {
 fn iso_block(scenario: &Scenario, slave: &Slave) -> IsoM {
     let device = slave.device;
     let units = |span: Span| (span.ticks() / Span::TICKS_PER_ISO_UNIT) as u32;
-    let t_dx = Plan::of(scenario).t_dx.ceil_to(Span::from_iso_units(1));
+    let t_dx = Plan::of(scenario).t_dx_told();
     IsoM {
         version: 1,
         t_base_dp: device.t_base_dp,

@@ -114,9 +114,13 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
     pub fn sink(&self) -> &S {
         &self.sink
     }
-    /// The run is over at `end`: the rows of the cycle under way leave as far as they came.
+    /// The run is over at `end`: the rows of the cycle under way leave as far as they came. A cycle that only begins
+    /// at the end belongs to the run no more.
     pub fn finish(mut self, end: Time) -> (Counts, S) {
         self.release();
+        if self.open.take_if(|open| open.t0 >= end).is_some() {
+            self.counts.network.cycles -= 1;
+        }
         self.flush();
         self.counts.finish(end);
         (self.counts, self.sink)
@@ -453,6 +457,15 @@ mod tests {
         assert_eq!((third.cycle, third.gc_jitter, third.t_dp), (3, Span::ZERO, None), "cycle 2 is missing");
         assert_eq!((counts.network.cycles, counts.network.retries, counts.slaves[1].retries), (3, 1, 1));
         assert_eq!(counts.network.duration, Span::from_ns(3_500_000));
+    }
+
+    #[test]
+    fn a_cycle_that_begins_at_the_end_is_none() {
+        let mut told = Told::new(0);
+        told.cycle(0, 0);
+        told.cycle(1_000_000, 1);
+        let (counts, kept) = told.over(1_000_000);
+        assert_eq!((counts.network.cycles, kept.cycles.len(), kept.slaves.len()), (1, 1, 2));
     }
 
     #[test]

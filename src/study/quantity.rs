@@ -309,13 +309,18 @@ fn ratio(text: &str, unit: &str, kind: &Kind, more: &[&str]) -> Result<(i128, i1
     let unit = SPELLINGS.iter().find(|(other, _)| *other == unit).map_or(unit, |&(_, usual)| usual);
     kind.units.iter().find(|(name, _)| *name == unit).map(|&(_, ratio)| ratio).ok_or_else(|| {
         let names: Vec<_> = kind.units.iter().map(|&(name, _)| name).chain(more.iter().copied()).collect();
-        QuantityError::Unit {
-            text: text.into(),
-            found: if unit.is_empty() { "no unit".into() } else { format!("the unit \"{unit}\"") },
-            noun: kind.noun,
-            units: names.join(", "),
-        }
+        QuantityError::Unit { text: text.into(), found: found(unit), noun: kind.noun, units: names.join(", ") }
     })
+}
+
+/// What stands in the place of a unit, in words.
+fn found(unit: &str) -> String {
+    let is_exponent = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-'));
+    match unit.strip_prefix(['e', 'E']) {
+        _ if unit.is_empty() => "no unit".into(),
+        Some(rest) if is_exponent(rest) => "an exponent, which is not read".into(),
+        _ => format!("the unit \"{unit}\""),
+    }
 }
 
 /// The whole number that `fraction` is.

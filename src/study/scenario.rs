@@ -73,7 +73,7 @@ impl Scenario {
         let source = path.display().to_string();
         let octets = read_file(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
         let text = decode(&octets).map_err(|fault| ScenarioError::about_file(&source, fault))?;
-        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = name_of(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
         Self::parse(&name, &source, text, overrides)
     }
 
@@ -142,6 +142,16 @@ fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
         return Err(too_long(5));
     }
     Ok(octets)
+}
+
+/// The scenario's name: the file's without its extension. Results go to a directory of this name.
+fn name_of(path: &Path) -> Result<String, Fault> {
+    match path.file_stem().map(|stem| stem.to_string_lossy().into_owned()) {
+        Some(name) if !matches!(name.as_str(), "." | "..") => Ok(name),
+        _ => Err(Fault::new("this file has no name before its extension")
+            .rule("the results of NAME.toml go to a directory NAME")
+            .help("rename it")),
+    }
 }
 
 /// The text that `octets` are, without a byte order mark.

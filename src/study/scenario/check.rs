@@ -9,6 +9,7 @@ use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, 
 use crate::device::options::Resolution;
 use crate::sim::motion;
 use crate::sim::noise::GcJitter;
+use crate::study::build;
 use crate::study::plan::Plan;
 use crate::study::quantity;
 use crate::time::{BitRate, Span};
@@ -34,6 +35,7 @@ const STAGES: &[&[Rule]] = &[
     &[functions, code_sequence, units_per_rev, total_range, jitter_fits, cycles_fit],
     &[publishers, subscribers, samples, link_counts, link_watchdog],
     &[event_stations, event_instants, disturbance_stations],
+    &[start_up],
 ];
 
 /// Largest offset of a crystal. Model: twice what cheap ones have over temperature and age.
@@ -293,7 +295,7 @@ fn t_i_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn t_o_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let t_dx = facts.plan.t_dx;
+    let t_dx = facts.plan.t_dx_told();
     for slave in facts.scenario.configured() {
         let min = facts.plan.t_o_min(slave.device);
         if slave.times.t_o < min {
@@ -350,8 +352,11 @@ fn window(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn delay(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
-        let max = Span::from_iso_units(u32::from(u16::MAX));
-        iso_units(reader, slave, ("t_pll_d", slave.times.t_pll_d), Span::ZERO, max, "3.3.9");
+        // The delayed latch must lie before the next clock, which may come a window early.
+        let window = slave.times.t_pll_w.max(slave.device.min_window);
+        let before_clock = (slave.times.t_i - window - Span::from_iso_units(1)).max(Span::ZERO);
+        let max = Span::from_iso_units(u32::from(u16::MAX)).min(before_clock);
+        iso_units(reader, slave, ("t_pll_d", slave.times.t_pll_d), Span::ZERO, max, "3.3.9, Model: D13");
     }
 }
 
@@ -644,6 +649,23 @@ fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
                 about(reader, &format!("disturbance.{}.{key}", i + 1), &[], fault);
             }
         }
+    }
+}
+
+/// A slave that starts up, or comes back, does so while the others exchange data.
+fn start_up(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let (plan, t_dp) = (&facts.plan, facts.scenario.master.t_dp);
+    let needed = |slave| plan.start_up(facts.scenario, slave, build::set_prm(facts.scenario, slave).len());
+    let longest = facts.scenario.configured().map(|slave| (needed(slave), slave)).max_by_key(|&(needed, _)| needed);
+    if let Some((needed, slave)) = longest.filter(|&(needed, _)| needed > t_dp) {
+        let fault = Fault::new(format!("T_DP = {t_dp} leaves slave {} no time to start up", slave.address))
+            .rule(format!(
+                "T_DP >= {needed}: Data_Exchange with the others, its Set_Prm, token {} and Global_Control {} (manual \
+                 3.3.2: time reserved for acyclic services, Model: D6)",
+                plan.token, plan.synch
+            ))
+            .help(format!("the shortest is t_dp = \"{}\"", needed.ceil_to(slave.device.dp_grid())));
+        about(reader, "master.t_dp", &[], fault);
     }
 }
 

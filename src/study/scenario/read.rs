@@ -185,10 +185,15 @@ fn overrides(reader: &mut Reader<'_>, root: &mut Table, slaves: &mut [SlaveTable
         let path: Vec<&str> = set.path.iter().map(String::as_str).collect();
         let key = set.path.join(".");
         let result = match path[..] {
-            ["slave", station, ref rest @ ..] => match slaves.iter_mut().find(|s| s.address.to_string() == station) {
-                Some(slave) => put(&mut slave.table, rest, &set.node),
-                None => Err(Fault::new(format!("no slave has the address \"{station}\""))),
-            },
+            ["slave", station, ref rest @ ..] => {
+                if let Some(slave) = slaves.iter_mut().find(|slave| slave.address.to_string() == station) {
+                    put(&mut slave.table, rest, &set.node)
+                } else {
+                    let all: Vec<_> = slaves.iter().map(|slave| slave.address.to_string()).collect();
+                    let fault = Fault::new(format!("no slave has the address \"{station}\""));
+                    Err(fault.help(format!("the slaves are {}", all.join(", "))))
+                }
+            }
             [name, index, ref rest @ ..] if TABLES[SINGLE..].contains(&name) => match entry(root, name, index) {
                 Some(table) => put(table, rest, &set.node),
                 None => Err(Fault::new(format!("there is no [[{name}]] number \"{index}\"")).help("the first is 1")),
