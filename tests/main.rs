@@ -7,6 +7,7 @@ mod foreign;
 mod golden;
 mod layers;
 mod manual;
+mod options;
 mod props;
 mod scenarios;
 mod startup;

@@ -19,7 +19,8 @@
 //! | Exchange | answer or none after the repeats | Exchange with the next slave; after the last Control, Startup or Acyclic |
 //! | Control | end of the Global_Control | Startup or Acyclic |
 //! | Startup, Acyclic | answer or none | Gap |
-//! | Gap | answer or none | Spare, the token sent |
+//! | Gap | answer or none | Spare, the token sent; Token where the spare time is active |
+//! | Token | `Schedule` due | Token, another token sent, while one fits; then Spare |
 //!
 //! A part that has nothing to do, or whose longest course would not end before the next SYNCH, is left out.
 
@@ -96,6 +97,8 @@ pub struct Settings {
     pub lost_after: u16,
     /// Cycles in Clear before Operate.
     pub clear_for: u64,
+    /// Whether further tokens to itself fill the spare time as far as they fit (Model: D6).
+    pub active_spare: bool,
     /// Data_Control_Time; the mode is told to the slaves at least every third of it (Model: D5).
     pub data_control_time: Span,
     /// The slaves, in the order in which they are polled.
@@ -116,6 +119,8 @@ enum Part {
     /// Global_Control is on its way.
     Control,
     Gap(Address),
+    /// A further token in active spare time.
+    Token,
 }
 
 /// A class 1 master.
@@ -242,6 +247,7 @@ impl<A: Application> Master<A> {
         match self.part {
             Part::Spare => self.synch(now, out),
             Part::Control => self.message(now, out),
+            Part::Token => self.further_token(now, out),
             _ => {}
         }
     }
@@ -456,7 +462,23 @@ impl<A: Application> Master<A> {
             acyclic: end - self.exchange_end,
             spare: (self.clock.planned() - end).max(Span::ZERO),
         });
-        self.spare(end, out);
+        self.idle(end, out);
+    }
+    /// The cycle's work ends at `end`: silence, or further tokens (Model: D6).
+    fn idle(&mut self, end: Local, out: &mut Outbox) {
+        if !self.settings.active_spare {
+            return self.spare(end, out);
+        }
+        self.part = Part::Token;
+        out.arm(Timer::Schedule, end);
+    }
+    fn further_token(&mut self, now: Local, out: &mut Outbox) {
+        if self.fits(self.settings.bus.rate.octets(3)) {
+            let end = self.active.pass_token(self.active.free_at(), out);
+            self.idle(end, out);
+        } else {
+            self.spare(now, out);
+        }
     }
 }
 

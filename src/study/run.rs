@@ -71,7 +71,7 @@ impl Speeds {
     fn of(scenario: &Scenario) -> Self {
         let mut speeds = vec![None; 128];
         for slave in &scenario.slaves {
-            let counts = slave.scaling.map_or(slave.device.steps_per_rev, |scaling| scaling.units_per_rev);
+            let counts = slave.scaling.map_or(slave.resolution().steps_per_rev, |scaling| scaling.units_per_rev);
             let shaft = Shaft::new(&slave.motion).expect("a checked motion");
             speeds[usize::from(slave.address.get())] = Some((shaft, f64::from(counts)));
         }
