@@ -258,17 +258,14 @@ impl<E: Copy> NearQueue<E> {
     fn note(&mut self, key: Key, event: E) {
         let page = page(day(key));
         let note = Note { key, event, next: self.pages[page] };
-        let id = match self.blank {
-            Some(id) => {
-                let blank = &mut self.notes[id.get() as usize - 1];
-                self.blank = blank.next;
-                *blank = note;
-                id
-            }
-            None => {
-                self.notes.push(note);
-                NoteId::new(self.notes.len() as u32).expect("not zero after a push")
-            }
+        let id = if let Some(id) = self.blank {
+            let blank = &mut self.notes[id.get() as usize - 1];
+            self.blank = blank.next;
+            *blank = note;
+            id
+        } else {
+            self.notes.push(note);
+            NoteId::new(self.notes.len() as u32).expect("not zero after a push")
         };
         self.pages[page] = Some(id);
         self.marked[page / 64] |= 1 << (page % 64);
