@@ -2,6 +2,7 @@
 
 mod determinism;
 mod encoder;
+mod encoder_scenarios;
 mod layers;
 mod manual;
 mod rig;

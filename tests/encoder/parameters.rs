@@ -74,7 +74,10 @@ fn section_3_1_set_prm_has_59_octets_with_these_fields() {
     let changed = prm(&changed);
     let user = SetPrm::parse(&changed).expect("parameters").blocks().next().expect("a block").expect("a block");
     let user = UserPrm81::parse(&user).expect("the user block");
-    assert_eq!((user.options.0, user.units_per_revolution, user.total_range, user.max_failures), (0x0A, 100, 12_800, 7));
+    assert_eq!(
+        (user.options.0, user.units_per_revolution, user.total_range, user.max_failures),
+        (0x0A, 100, 12_800, 7)
+    );
     let iso = IsoM::parse(&blocks[1]).expect("the isochronous block");
     let expected = IsoM {
         version: 1,
@@ -233,7 +236,9 @@ fn section_3_2_4_total_range_up_to_units_times_revolutions() {
 fn section_3_2_4_the_manuals_example_counts_to_12799() {
     let mut rig = Rig::exchanging(&prm(&scaled(100, 12_800)));
     // 128 revolutions; 123.5 revolutions are 12350 units; 18 bits are left in front of 14.
-    for (revs, steps, value) in [(0, 0, 0), (123, 4_096, 12_350), (127, 8_191, 12_799), (128, 0, 0), (255, 8_191, 12_799)] {
+    for (revs, steps, value) in
+        [(0, 0, 0), (123, 4_096, 12_350), (127, 8_191, 12_799), (128, 0, 0), (255, 8_191, 12_799)]
+    {
         rig.raw = revs * 8_192 + steps;
         let inputs = rig.cycle(0, 0x2000);
         assert_eq!((inputs.xist1, inputs.xist2), (value << 18, value));
@@ -279,7 +284,8 @@ fn section_3_3_3_t_mapc_is_1_to_14() {
 
 #[test]
 fn section_3_3_4_t_base_io_is_one_of_six() {
-    for (base, t_i, t_o) in [(375u32, 4, 32), (750, 2, 16), (1_500, 1, 8), (3_000, 1, 4), (6_000, 1, 2), (12_000, 1, 0)] {
+    for (base, t_i, t_o) in [(375u32, 4, 32), (750, 2, 16), (1_500, 1, 8), (3_000, 1, 4), (6_000, 1, 2), (12_000, 1, 0)]
+    {
         let of = |base| [&u32_at(44, base)[..], &u16_at(48, t_i), &u16_at(50, t_o)].concat();
         refused(&prm(&of(base + 1)), "T_BASE_IO in 1/12 us");
         if t_o > 0 {
