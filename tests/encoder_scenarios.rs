@@ -263,7 +263,9 @@ fn read_parameters() {
     let shortest = run.cycles.iter().filter(|row| row.cycle > idle).filter_map(|row| row.acyclic).min();
     assert!(shortest < Some(longest), "{longest}");
     assert!(run.cycles.iter().all(|row| row.retries == 0));
-    [3, 4].into_iter().for_each(|slave| assert_undisturbed(&run, slave));
+    for slave in [3, 4] {
+        assert_undisturbed(&run, slave);
+    }
 }
 
 #[test]
@@ -316,8 +318,8 @@ fn leds() {
 
     // Slave 3 by the clock: the last request in cycle 299, the watchdog, 40 s, the first SYNCH.
     let at: Vec<_> = leds_of(&run, 3).into_iter().map(|(at, _)| at).collect();
-    let last = run.telegrams.iter().filter(|&&(_, end, sender, _)| sender == address(3) && end < at[3]);
-    let (request_end, ..) = last.last().expect("a reply");
+    let mut last = run.telegrams.iter().filter(|&&(_, end, sender, _)| sender == address(3) && end < at[3]);
+    let (request_end, ..) = last.next_back().expect("a reply");
     let near = |instant: Time, after: Span| (instant - *request_end - after).abs() < Span::from_us(5);
     assert!(near(at[3], Span::from_ms(200)) && near(at[4], Span::from_s(40)), "{:?}", &at[3..]);
     let back = run.cycles.iter().find(|row| row.cycle == 4_800).expect("a cycle");

@@ -215,7 +215,7 @@ impl Rig {
         }
         let outputs = Outputs81 { stw2: Stw2(u16::from(mls) << 12), g1_stw: G1Stw(g1_stw) };
         let reply = self.exchange(&outputs.emit());
-        self.t0 = self.t0 + T_DP;
+        self.t0 += T_DP;
         self.advance(self.t0 - Span::from_us(50));
         match reply {
             Reply::Data(_, du) => Inputs81::parse(&du).expect("telegram 81"),
