@@ -71,7 +71,7 @@
 //! let profile = profile::find("posital-ocd-dpb1b").expect("a known device");
 //! let address = Address::new(6).expect("an address");
 //! let settings = UnitSettings::new(address, BitRate::M12, Tbit(30));
-//! let mut encoder = Encoder::new(profile, settings, Disc::new(profile));
+//! let mut encoder = Encoder::new(profile, settings, Disc::new(profile, &settings.options));
 //!
 //! let mut out = Outbox::new();
 //! encoder.step(Local::ZERO, Input::PowerOn, &mut out);

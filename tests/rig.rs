@@ -132,10 +132,10 @@ impl Rig {
     fn step(&mut self, input: Input<'_, core::convert::Infallible>) {
         self.out.clear();
         self.encoder.step(self.now, input, &mut self.out);
-        for (timer, order) in self.timers.iter_mut().zip(self.out.orders()) {
-            apply(timer, *order);
+        for (which, order) in self.out.orders() {
+            // The sample is asked for behind the timers.
+            apply(self.timers.get_mut(which).unwrap_or(&mut self.sample), order);
         }
-        apply(&mut self.sample, self.out.sample_order());
         self.seen.extend(self.out.observations().copied());
     }
     /// Lets time pass; timers and the latch come when they are due.
@@ -230,7 +230,6 @@ impl Rig {
 
 fn apply(place: &mut Option<Local>, order: Order) {
     match order {
-        Order::Keep => {}
         Order::At(at) => *place = Some(at),
         Order::Off => *place = None,
     }

@@ -191,28 +191,28 @@ fn observed(run: &Run, slave: u8, cycle: u64) -> impl Iterator<Item = &Observati
     run.events_of(slave).filter(move |row| row.cycle == cycle).map(|row| &row.what)
 }
 
-/// One acyclic message per cycle brings a slave through Slave_Diag, Get_Cfg, Set_Prm, Chk_Cfg and Slave_Diag; while two
-/// start up (slave 4 without supply), every other cycle is a slave's own. Operate is told in the cycle after, and with
-/// the Data_Exchange after this the clock recovery begins.
+/// One acyclic message per cycle brings a slave through Slave_Diag, Get_Cfg, Set_Prm, Chk_Cfg and Slave_Diag; a slave that
+/// gets on has all of them (slave 4 is without supply). Operate is told in the cycle after, and with the Data_Exchange
+/// after this the clock recovery begins.
 #[test]
 fn startup() {
     use Phase::{Clock, MasterLife, Operation, SlaveLife};
     let network = scenario("startup", &[]);
     let run = Run::of(&network);
-    assert_eq!(run.phases_of(3), [(Clock, 11), (MasterLife, 28), (SlaveLife, 45), (Operation, 61)]);
+    assert_eq!(run.phases_of(3), [(Clock, 6), (MasterLife, 23), (SlaveLife, 40), (Operation, 56)]);
     assert_eq!(run.phases_of(4), [(Clock, 105), (MasterLife, 122), (SlaveLife, 139), (Operation, 155)]);
     assert_undisturbed(&network, &run);
 
-    // The signs of life count 1 to 15 and on with 1; the slave's begins 16 steps after the start value in cycle 29.
+    // The signs of life count 1 to 15 and on with 1; the slave's begins 16 steps after the start value in cycle 24.
     let ring = |since: u64| (since % 15) as u8 + 1;
     for row in run.slave(3).filter(|row| row.cycle < 298) {
-        let sls = if row.cycle < 45 { 0 } else { ring(row.cycle - 45) };
-        let mls = if row.cycle < 28 { 0 } else { ring(row.cycle - 10) };
+        let sls = if row.cycle < 40 { 0 } else { ring(row.cycle - 40) };
+        let mls = if row.cycle < 23 { 0 } else { ring(row.cycle - 5) };
         assert_eq!((row.sls, row.mls, row.life_counter, row.clock_counter), (sls, mls, 0, 0), "cycle {}", row.cycle);
-        assert_eq!((row.g1_zsw & ERROR, row.latch_offset.is_some()), (0, row.cycle >= 28), "cycle {}", row.cycle);
+        assert_eq!((row.g1_zsw & ERROR, row.latch_offset.is_some()), (0, row.cycle >= 23), "cycle {}", row.cycle);
     }
     // What is latched in a cycle travels in the next (Model: D8).
-    assert_eq!([45, 46, 47].map(|k| run.reply(3, k).expect("a reply").zsw2.sign_of_life().get()), [0, 1, 2]);
+    assert_eq!([40, 41, 42].map(|k| run.reply(3, k).expect("a reply").zsw2.sign_of_life().get()), [0, 1, 2]);
     // No crystal is off: nothing but the line and the timer grid moves a latch.
     for row in run.slaves.iter().filter(|row| row.latch_offset.is_some()) {
         let late = row.latch_offset.expect("locked") - t_td(&network, network.master.address, row.slave);
@@ -355,7 +355,7 @@ fn life_sign_loss() {
     assert_eq!(counters(3, 299..304), [0, 10, 20, 0, 0]);
     assert_eq!(run.faults_of(3), [(301, 0x0F02)]);
     assert_eq!(run.phases_of(3)[4..], [(MasterLife, 301), (SlaveLife, 318), (Operation, 334)]);
-    assert_eq!([300, 301, 317, 318, 319].map(|k| run.row(3, k).sls), [12, 0, 0, 1, 2]);
+    assert_eq!([300, 301, 317, 318, 319].map(|k| run.row(3, k).sls), [6, 0, 0, 1, 2]);
     assert_shown(&run, 3, 301..400, 0x0F02);
     let reply = run.reply(3, 302).expect("a reply");
     assert_eq!((reply.zsw2.0, reply.g1_zsw.0, reply.xist2), (0, ERROR, 0x0F02));

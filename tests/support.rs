@@ -18,6 +18,17 @@ use isodp::time::Time;
 use isodp::wire::drive::Inputs81;
 use isodp::wire::{Address, Telegram};
 
+/// Names of all shipped scenarios, in order.
+pub(crate) fn shipped() -> Vec<String> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let files = std::fs::read_dir(folder).expect("scenarios").map(|entry| entry.expect("an entry").path());
+    let names = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    let mut names: Vec<_> =
+        names.map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
 /// The shipped scenario of this name, with changed values.
 pub(crate) fn scenario(name: &str, sets: &[(&str, &str)]) -> Scenario {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{name}.toml"));

@@ -54,6 +54,17 @@ impl Command {
     }
 }
 
+/// How the application counts its signs of life (Model: D17).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct LifeSettings {
+    /// Cycles per value, T_MAPC, 1..=14 (manual 3.3.3).
+    pub t_mapc: u8,
+    /// First value, 1..=15. Model: D17, default 1.
+    pub start: u8,
+    /// Cycles from a slave's data exchange in Operate to the first value. Model: D17, default 0.
+    pub delay: u32,
+}
+
 /// What the application keeps of one slave.
 #[derive(Clone, Debug)]
 struct Axis {
@@ -62,6 +73,8 @@ struct Axis {
     /// Own sign of life for this slave and the cycles for which it has been sent.
     sign: LifeSign,
     age: u8,
+    /// Cycles that the first value still waits.
+    wait: u32,
     /// What the coming cycle sends instead.
     jump: Option<LifeSign>,
     held: Held,
@@ -83,19 +96,19 @@ enum Held {
 #[derive(Clone, Debug)]
 pub struct Controller {
     axes: Vec<Axis>,
-    t_mapc: u8,
-    start: LifeSign,
+    life: LifeSettings,
     parameters: ParameterClient,
 }
 
 impl Controller {
-    /// An application for these slaves, counting every `t_mapc` cycles (1..=14) from `start` on (1..=15).
-    pub fn new(slaves: impl IntoIterator<Item = Address>, t_mapc: u8, start: u8) -> Self {
+    /// An application for these slaves.
+    pub fn new(slaves: impl IntoIterator<Item = Address>, life: LifeSettings) -> Self {
         let axis = |slave| Axis {
             slave,
             joined: false,
             sign: LifeSign::INVALID,
             age: 0,
+            wait: life.delay,
             jump: None,
             held: Held::No,
             control: G1Stw::default(),
@@ -103,12 +116,7 @@ impl Controller {
             monitor: Monitor::new(MonitorSettings::new(1, TOLERANCE)),
             received: LifeSign::INVALID,
         };
-        Self {
-            axes: slaves.into_iter().map(axis).collect(),
-            t_mapc,
-            start: LifeSign::new(start),
-            parameters: ParameterClient::default(),
-        }
+        Self { axes: slaves.into_iter().map(axis).collect(), life, parameters: ParameterClient::default() }
     }
     /// State of the check of a slave's sign of life.
     pub fn slave_life(&self, slave: Address) -> Option<LifeState> {
@@ -118,7 +126,7 @@ impl Controller {
 
 impl Axis {
     /// One cycle of the sign of life.
-    fn count(&mut self, t_mapc: u8, start: LifeSign, out: &mut Outbox) {
+    fn count(&mut self, life: LifeSettings, out: &mut Outbox) {
         if let Held::For(cycles) = self.held {
             if cycles == 0 {
                 self.hold(Held::No, out);
@@ -129,12 +137,14 @@ impl Axis {
         self.acknowledge = self.acknowledge.saturating_sub(1);
         if let Some(sign) = self.jump.take() {
             (self.sign, self.age) = (sign, 0);
+        } else if !self.sign.is_valid() && self.wait > 0 {
+            self.wait -= 1;
         } else if !self.sign.is_valid() {
-            (self.sign, self.age) = (start, 0);
-        } else if self.held == Held::No && self.age + 1 >= t_mapc {
+            (self.sign, self.age) = (LifeSign::new(life.start), 0);
+        } else if self.held == Held::No && self.age + 1 >= life.t_mapc {
             (self.sign, self.age) = (self.sign.next(), 0);
         } else {
-            self.age = self.age.saturating_add(1).min(t_mapc - 1);
+            self.age = self.age.saturating_add(1).min(life.t_mapc - 1);
         }
     }
     fn hold(&mut self, held: Held, out: &mut Outbox) {
@@ -159,9 +169,9 @@ impl Application for Controller {
     fn cycle(&mut self, _cycle: u64, mode: MasterMode, out: &mut Outbox) {
         for axis in &mut self.axes {
             if axis.joined && mode == MasterMode::Operate {
-                axis.count(self.t_mapc, self.start, out);
+                axis.count(self.life, out);
             } else {
-                (axis.sign, axis.jump) = (LifeSign::INVALID, None);
+                (axis.sign, axis.jump, axis.wait) = (LifeSign::INVALID, None, self.life.delay);
             }
         }
     }
@@ -182,7 +192,7 @@ impl Application for Controller {
         let axis = &mut self.axes[slave];
         let from = axis.monitor.state();
         axis.joined = joined;
-        axis.sign = LifeSign::INVALID;
+        (axis.sign, axis.wait) = (LifeSign::INVALID, self.life.delay);
         axis.received = LifeSign::INVALID;
         axis.monitor.reset();
         if from != LifeState::Waiting {
@@ -224,7 +234,7 @@ mod tests {
     /// Signs of life sent in cycles 0.. at this T_MAPC; `order` is given before cycle 4 begins.
     fn sent(t_mapc: u8, order: Command) -> [u8; 10] {
         let mut out = Outbox::new();
-        let mut controller = Controller::new([SLAVE], t_mapc, 1);
+        let mut controller = Controller::new([SLAVE], LifeSettings { t_mapc, start: 1, delay: 0 });
         controller.joined(0, true, &mut out);
         core::array::from_fn(|cycle| {
             if cycle == 4 {

@@ -46,6 +46,7 @@ pub mod encoder;
 pub mod isochronous;
 pub mod leds;
 pub mod node;
+pub mod options;
 pub mod parameter_client;
 pub mod parameters;
 pub mod pll;

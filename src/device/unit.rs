@@ -7,6 +7,7 @@
 
 use crate::device::isochronous::{IsoSettings, Isochronous};
 use crate::device::leds::{LedInput, LedLogic};
+use crate::device::options::UnitOptions;
 use crate::device::profile::Profile;
 use crate::device::sensor::{Answer, Fault, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
 use crate::dp::ms1::Records;
@@ -65,16 +66,14 @@ pub struct UnitSettings {
     pub rate: BitRate,
     /// Own T_SDR (Model: D2).
     pub t_sdr: Tbit,
-    /// Tolerated clock failures (Model: D15).
-    pub clock_tolerance: u8,
-    /// How the sensor handshake answers where vendors differ.
-    pub sensor: SensorOptions,
+    /// Where this unit differs from others.
+    pub options: UnitOptions,
 }
 
 impl UnitSettings {
     /// Settings with the defaults of the model.
     pub fn new(address: Address, rate: BitRate, t_sdr: Tbit) -> Self {
-        Self { address, rate, t_sdr, clock_tolerance: 1, sensor: SensorOptions::default() }
+        Self { address, rate, t_sdr, options: UnitOptions::default() }
     }
 }
 
@@ -124,7 +123,7 @@ impl<F: Function> Unit<F> {
             profile,
             settings,
             iso: None,
-            sensor: Sensor::new(settings.sensor),
+            sensor: Sensor::new(settings.options.sensor),
             channel: Channel::EMPTY,
             function,
             outputs: Outputs81::default(),
@@ -168,7 +167,7 @@ impl<F: Function> Body<F> {
         if let Some(mut iso) = self.iso.take() {
             iso.leave(out);
         }
-        self.sensor = Sensor::new(self.settings.sensor);
+        self.sensor = Sensor::new(self.settings.options.sensor);
         self.channel = Channel::EMPTY;
         self.causes = Faults::NONE;
         self.answer = Answer::NONE;
@@ -346,9 +345,9 @@ impl<F: Function> Application for Body<F> {
         let iso = iso_block(prm).ok().flatten().filter(|_| prm.dpv1.isom_req());
         self.iso = iso
             .and_then(|block| IsoM::parse(&block).ok())
-            .map(|iso| Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), self.settings.clock_tolerance)));
-        let preset_enabled = self.settings.sensor.preset_enabled && F::slow(prm);
-        self.sensor = Sensor::new(SensorOptions { preset_enabled, ..self.settings.sensor });
+            .map(|iso| Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), &self.settings.options)));
+        let preset_enabled = self.settings.options.sensor.preset_enabled && F::slow(prm);
+        self.sensor = Sensor::new(SensorOptions { preset_enabled, ..self.settings.options.sensor });
         self.function.parameterise(prm, watchdog);
     }
     fn enter(&mut self, _now: Local, out: &mut Outbox) {

@@ -7,14 +7,20 @@
 //!       t0                               T_DX
 //! ```
 //!
+//! The acyclic message is one service for a slave that starts up, or one of the acyclic job; where the mode has to be
+//! told, a Global_Control comes before it. A slave that gets on is served until it exchanges data, then the next one: from Set_Prm on its watchdog
+//! runs, and a cycle has time for one service only.
+//!
 //! | part | ends with | next part |
 //! |---|---|---|
 //! | Starting | token claimed | Spare, first SYNCH one T_DP later |
 //! | Spare | `Schedule` due | Clock: SYNCH on its way |
 //! | Clock | its last bit has left | Exchange with the first slave |
 //! | Exchange | answer or none after the repeats | Exchange with the next slave; after the last Control, Startup or Acyclic |
-//! | Control, Startup, Acyclic | end of the Global_Control, answer or none | Gap |
-//! | Gap | answer or none | Spare, the token sent |
+//! | Control | end of the Global_Control | Startup or Acyclic |
+//! | Startup, Acyclic | answer or none | Gap |
+//! | Gap | answer or none | Spare, the token sent; Token where the spare time is active |
+//! | Token | `Schedule` due | Token, another token sent, while one fits; then Spare |
 //!
 //! A part that has nothing to do, or whose longest course would not end before the next SYNCH, is left out.
 
@@ -91,6 +97,8 @@ pub struct Settings {
     pub lost_after: u16,
     /// Cycles in Clear before Operate.
     pub clear_for: u64,
+    /// Whether further tokens to itself fill the spare time as far as they fit (Model: D6).
+    pub active_spare: bool,
     /// Data_Control_Time; the mode is told to the slaves at least every third of it (Model: D5).
     pub data_control_time: Span,
     /// The slaves, in the order in which they are polled.
@@ -111,6 +119,8 @@ enum Part {
     /// Global_Control is on its way.
     Control,
     Gap(Address),
+    /// A further token in active spare time.
+    Token,
 }
 
 /// A class 1 master.
@@ -157,7 +167,8 @@ impl<A: Application> Master<A> {
             retries: 0,
             control_due: true,
             control_told: 0,
-            control_every: third.div_floor(settings.t_dp).max(1) as u64,
+            // Never in every cycle: slaves start up in the acyclic part too.
+            control_every: third.div_floor(settings.t_dp).max(2) as u64,
             startup_next: 0,
             ms1: Client::new(C1_RESPONSE_TIMEOUT),
             settings,
@@ -235,7 +246,8 @@ impl<A: Application> Master<A> {
     fn scheduled(&mut self, now: Local, out: &mut Outbox) {
         match self.part {
             Part::Spare => self.synch(now, out),
-            Part::Control => self.gap(out),
+            Part::Control => self.message(now, out),
+            Part::Token => self.further_token(now, out),
             _ => {}
         }
     }
@@ -322,8 +334,7 @@ impl<A: Application> Master<A> {
         self.active.free_at() + span + self.active.t_id1() <= self.clock.planned()
     }
 
-    /// The one acyclic message of this cycle: the mode if it is due, else a slave's start-up and the acyclic job in
-    /// turn (Model: D6).
+    /// The acyclic part of this cycle: the mode if it is due, then one message (Model: D6).
     fn acyclic(&mut self, now: Local, out: &mut Outbox) {
         let since = self.clock.coming().saturating_sub(self.control_told);
         let control = self.control_due || since >= self.control_every;
@@ -331,6 +342,10 @@ impl<A: Application> Master<A> {
         if control && self.fits(rate.octets(GC_OCTETS) + self.settings.bus.span(self.settings.bus.t_id2())) {
             return self.tell_mode(out);
         }
+        self.message(now, out);
+    }
+    /// The one acyclic message: a slave's start-up and the acyclic job in turn; then the GAP.
+    fn message(&mut self, now: Local, out: &mut Outbox) {
         let count = self.handlers.len();
         let mut slaves = (0..count).map(|i| (self.startup_next + i) % count);
         let starting = slaves.find(|&slave| !self.handlers[slave].exchanges());
@@ -395,7 +410,6 @@ impl<A: Application> Master<A> {
         let request = Request { to: handler.params().address, service: Service::SrdHigh, saps: Some(saps), retries };
         self.active.request(self.active.free_at(), &request, du.len(), out, |to| to.copy_from_slice(du));
         self.part = Part::Startup(slave);
-        self.startup_next = slave + 1;
     }
     fn startup_answered(&mut self, slave: usize, confirm: Confirm<'_>, out: &mut Outbox) {
         let answer = match confirm {
@@ -404,11 +418,15 @@ impl<A: Application> Master<A> {
             Confirm::Acknowledged => Answer::Acknowledged,
             _ => Answer::Nothing,
         };
-        if self.handlers[slave].answered(answer, out) {
+        let handler = &mut self.handlers[slave];
+        let before = handler.state();
+        if handler.answered(answer, out) {
             self.app.joined(slave, true, out);
             // The newcomer has not heard the mode yet.
             self.control_due = true;
         }
+        let gets_on = self.handlers[slave].state() > before;
+        self.startup_next = if gets_on { slave } else { slave + 1 };
     }
 
     fn patch(&mut self, slave: Address, telegram: StartupTelegram, patch: &Patch, out: &mut Outbox) {
@@ -444,7 +462,23 @@ impl<A: Application> Master<A> {
             acyclic: end - self.exchange_end,
             spare: (self.clock.planned() - end).max(Span::ZERO),
         });
-        self.spare(end, out);
+        self.idle(end, out);
+    }
+    /// The cycle's work ends at `end`: silence, or further tokens (Model: D6).
+    fn idle(&mut self, end: Local, out: &mut Outbox) {
+        if !self.settings.active_spare {
+            return self.spare(end, out);
+        }
+        self.part = Part::Token;
+        out.arm(Timer::Schedule, end);
+    }
+    fn further_token(&mut self, now: Local, out: &mut Outbox) {
+        if self.fits(self.settings.bus.rate.octets(3)) {
+            let end = self.active.pass_token(self.active.free_at(), out);
+            self.idle(end, out);
+        } else {
+            self.spare(now, out);
+        }
     }
 }
 

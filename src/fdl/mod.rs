@@ -160,8 +160,9 @@ impl Timer {
 pub struct Outbox {
     frame: Frame,
     send: Option<Send>,
-    arm: [Order; Timer::ALL.len()],
-    sample: Order,
+    /// What becomes of the deadlines; an entry counts if its bit in `ordered` is set.
+    orders: [Order; Self::DEADLINES],
+    ordered: u8,
     sample_with_telegrams: Option<bool>,
     observations: [Option<Observation>; Self::MAX_OBSERVATIONS],
     observed: usize,
@@ -177,11 +178,8 @@ pub struct Send {
 }
 
 /// What is to become of a deadline.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Order {
-    /// Leave it.
-    #[default]
-    Keep,
     /// Arm it, whatever it was.
     At(Local),
     /// Disarm it.
@@ -197,14 +195,18 @@ impl Default for Outbox {
 impl Outbox {
     /// Observations that one step may make: a few for each of 126 stations. A step that needs more is a bug.
     pub const MAX_OBSERVATIONS: usize = 160;
+    /// Deadlines of a station: the timers by their numbers, and behind them the asked sample.
+    pub const DEADLINES: usize = Self::SAMPLE + 1;
+    /// Number of the asked sample among the deadlines.
+    const SAMPLE: usize = Timer::ALL.len();
 
     /// An empty outbox.
     pub const fn new() -> Self {
         Self {
             frame: Frame::new(),
             send: None,
-            arm: [Order::Keep; Timer::ALL.len()],
-            sample: Order::Keep,
+            orders: [Order::Off; Self::DEADLINES],
+            ordered: 0,
             sample_with_telegrams: None,
             observations: [None; Self::MAX_OBSERVATIONS],
             observed: 0,
@@ -214,8 +216,7 @@ impl Outbox {
     /// Makes it empty for the next step.
     pub fn clear(&mut self) {
         self.send = None;
-        self.arm = [Order::Keep; Timer::ALL.len()];
-        self.sample = Order::Keep;
+        self.ordered = 0;
         self.sample_with_telegrams = None;
         self.observed = 0;
     }
@@ -238,19 +239,23 @@ impl Outbox {
 
     /// Arms `timer`; an earlier arming is forgotten.
     pub fn arm(&mut self, timer: Timer, at: Local) {
-        self.arm[timer as usize] = Order::At(at);
+        self.order(timer as usize, Order::At(at));
     }
     /// Disarms `timer`.
     pub fn disarm(&mut self, timer: Timer) {
-        self.arm[timer as usize] = Order::Off;
+        self.order(timer as usize, Order::Off);
+    }
+    fn order(&mut self, which: usize, order: Order) {
+        self.orders[which] = order;
+        self.ordered |= 1 << which;
     }
     /// Asks for the raw position of the shaft at `at`; [`Input::Sample`] brings it. One at a time.
     pub fn sample_at(&mut self, at: Local) {
-        self.sample = Order::At(at);
+        self.order(Self::SAMPLE, Order::At(at));
     }
     /// Forgets an asked sample.
     pub fn cancel_sample(&mut self) {
-        self.sample = Order::Off;
+        self.order(Self::SAMPLE, Order::Off);
     }
     /// From now on every telegram brings the shaft's raw position along, or no more (Model: D8).
     pub fn sample_with_telegrams(&mut self, on: bool) {
@@ -266,13 +271,14 @@ impl Outbox {
     pub fn sending(&self) -> Option<(Send, &Frame)> {
         self.send.map(|send| (send, &self.frame))
     }
-    /// What becomes of the deadlines, by [`Timer`] number.
-    pub fn orders(&self) -> &[Order; Timer::ALL.len()] {
-        &self.arm
-    }
-    /// What becomes of the asked sample.
-    pub fn sample_order(&self) -> Order {
-        self.sample
+    /// What becomes of the deadlines: their numbers, ascending, with the order for each. The others stay as they are.
+    pub fn orders(&self) -> impl Iterator<Item = (usize, Order)> {
+        let mut left = self.ordered;
+        core::iter::from_fn(move || {
+            let which = (left != 0).then(|| left.trailing_zeros() as usize)?;
+            left &= left - 1;
+            Some((which, self.orders[which]))
+        })
     }
     /// Whether telegrams shall bring the shaft's position, where that changed.
     pub fn sampling_with_telegrams(&self) -> Option<bool> {

@@ -36,6 +36,8 @@ pub struct Flight {
     pub end: Time,
     /// Index of the sending station.
     pub sender: usize,
+    /// Number of the telegram, counted on the line.
+    pub number: u64,
     place: Place,
     /// The characters.
     pub frame: Frame,
@@ -55,6 +57,8 @@ const RECENT: usize = 4;
 pub struct Bus {
     flights: Vec<Flight>,
     free: Vec<FlightId>,
+    /// Telegrams sent.
+    sent: u64,
     /// The telegrams sent last, newest first.
     recent: [Option<(Time, Time, Place)>; RECENT],
     last: Option<FlightId>,
@@ -73,12 +77,14 @@ impl Bus {
         frame: &Frame,
     ) -> (FlightId, Option<usize>) {
         let id = self.free.pop().unwrap_or_else(|| {
-            self.flights.push(Flight { start, end, sender, place, frame: Frame::new(), listeners: 0 });
+            self.flights.push(Flight { start, end, sender, number: 0, place, frame: Frame::new(), listeners: 0 });
             FlightId(self.flights.len() as u16 - 1)
         });
         let flight = &mut self.flights[usize::from(id.0)];
         flight.frame.copy_from(frame);
         (flight.start, flight.end, flight.sender, flight.place, flight.listeners) = (start, end, sender, place, 0);
+        flight.number = self.sent;
+        self.sent += 1;
         self.recent.rotate_right(1);
         self.recent[0] = Some((start, end, place));
 
@@ -102,9 +108,9 @@ impl Bus {
         }
     }
 
-    /// A station will hear the end of this telegram.
-    pub fn add_listener(&mut self, id: FlightId) {
-        self.flights[usize::from(id.0)].listeners += 1;
+    /// So many stations will hear the end of this telegram.
+    pub fn add_listeners(&mut self, id: FlightId, count: u16) {
+        self.flights[usize::from(id.0)].listeners += count;
     }
     /// The telegram, for a listener that hears its end now.
     pub fn flight(&self, id: FlightId) -> &Flight {
@@ -156,9 +162,9 @@ mod tests {
     fn telegrams_that_overlap_are_both_garbled_and_those_that_follow_are_not() {
         let mut bus = Bus::default();
         let (a, clean) = bus.send(0, Place::default(), (ns(0), ns(100)), &token());
-        bus.add_listener(a);
+        bus.add_listeners(a, 1);
         let (b, hit) = bus.send(1, Place::default(), (ns(99), ns(199)), &token());
-        bus.add_listener(b);
+        bus.add_listeners(b, 1);
         assert_eq!((clean, hit), (None, Some(0)));
         for id in [a, b] {
             assert!(bus.flight(id).frame.octets() != token().octets());

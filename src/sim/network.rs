@@ -1,8 +1,8 @@
 //! The network: stations on a line, and the one loop that makes time pass.
 //!
-//! Events are ordered by (time, phase, station, per-station number), see [`queue`](super::queue). A station's events
-//! are numbered by this station alone, and each random stream belongs to one station, so that a station more or less
-//! changes nothing for the others.
+//! Events are ordered by (time, phase, station, number), see [`queue`](super::queue). A telegram's arrivals have its
+//! number on the line, a station's other events are numbered by this station alone. Only the order of numbers matters,
+//! and each random stream belongs to one station, so that a station more or less changes nothing for the others.
 
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
 use crate::observation::{self, Observation};
@@ -60,9 +60,6 @@ pub enum Until {
     Cycle(u64),
 }
 
-/// Deadlines of a station: the timers, and the asked sample behind them.
-const DEADLINES: usize = Timer::ALL.len() + 1;
-
 /// A deadline. Only one event of it counts at a time; arming it later than that event costs nothing until it comes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Deadline {
@@ -76,6 +73,8 @@ struct Deadline {
 enum Event {
     Act(u32),
     Telegram(FlightId),
+    /// A telegram for all reaches the station of this rank among the sender's neighbours; the next one is not yet told.
+    Broadcast(FlightId, u8),
     Sent,
     Deadline(u8),
 }
@@ -86,8 +85,8 @@ struct Slot<S> {
     filter: Filter,
     powered: bool,
     sample_with_telegrams: bool,
-    deadlines: [Deadline; DEADLINES],
-    /// Number of the station's next event.
+    deadlines: [Deadline; Outbox::DEADLINES],
+    /// Number of the station's next event other than a telegram.
     number: u64,
 }
 
@@ -99,6 +98,8 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     by_address: [Option<u8>; 128],
     /// Slots that hear more than what is for them or for everybody.
     curious: Vec<u8>,
+    /// For each slot all others, in the order in which a telegram reaches them.
+    neighbours: Vec<Vec<u8>>,
     bus: Bus,
     queue: Q,
     jitter: JitterSource,
@@ -137,7 +138,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 filter,
                 powered: false,
                 sample_with_telegrams: false,
-                deadlines: [Deadline::default(); DEADLINES],
+                deadlines: [Deadline::default(); Outbox::DEADLINES],
                 number: 0,
             });
         }
@@ -146,6 +147,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             slots,
             by_address,
             curious: Vec::new(),
+            neighbours: Vec::new(),
             bus: Bus::default(),
             queue: Q::default(),
             jitter,
@@ -158,6 +160,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             out: Outbox::new(),
         };
         network.sort_listeners();
+        network.neighbours = (0..network.slots.len()).map(|sender| network.neighbours_of(sender)).collect();
         for index in 0..network.slots.len() {
             let (address, at) = (network.slots[index].address, network.slots[index].site.powered_at);
             network.order(When::Time(at), address, Act::PowerOn);
@@ -218,6 +221,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         match event {
             Event::Act(act) => self.act(act as usize, recorder),
             Event::Telegram(id) => self.telegram(slot, id, recorder),
+            Event::Broadcast(id, rank) => {
+                self.tell_neighbour(id, rank + 1);
+                self.telegram(slot, id, recorder);
+            }
             Event::Sent => self.sent(slot, recorder),
             Event::Deadline(which) => self.deadline(slot, usize::from(which), recorder),
         }
@@ -329,9 +336,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             station.filter = filter;
             self.sort_listeners();
         }
-        for (which, order) in self.out.orders().iter().copied().chain([self.out.sample_order()]).enumerate() {
+        for (which, order) in self.out.orders() {
             match order {
-                Order::Keep => {}
                 Order::Off => self.slots[slot].deadlines[which].due = None,
                 Order::At(at) => Self::arm(&mut self.queue, &mut self.slots[slot], which, at.max(now), self.now),
             }
@@ -386,7 +392,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         if let Some(with) = hit {
             self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
         }
-        self.deliver(slot, id, end);
+        self.deliver(slot, id);
     }
     /// The running cycle, or the one that the SYNCH being sent will begin.
     fn clocks_begun(&self, clock: bool) -> u64 {
@@ -394,34 +400,64 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// Tells every listener when the telegram's end will reach it.
-    fn deliver(&mut self, sender: usize, id: FlightId, end: Time) {
+    fn deliver(&mut self, sender: usize, id: FlightId) {
         let route = Route::of(self.bus.flight(id).frame.octets());
-        let mut heard = false;
         if matches!(route, Some(Route { da: Route::TO_ALL, reply: false, .. })) {
-            for listener in 0..self.slots.len() {
-                heard |= self.deliver_to(listener, sender, id, end, route);
-            }
-        } else {
-            for index in 0..self.curious.len() {
-                heard |= self.deliver_to(self.curious[index].into(), sender, id, end, route);
-            }
-            let addressed = route.and_then(|route| self.by_address[usize::from(route.da)]);
-            if let Some(listener) = addressed.filter(|slot| !self.curious.contains(slot)) {
-                heard |= self.deliver_to(listener.into(), sender, id, end, route);
-            }
+            return self.broadcast(sender, id);
+        }
+        let mut heard = false;
+        for index in 0..self.curious.len() {
+            heard |= self.deliver_to(self.curious[index].into(), sender, id, route);
+        }
+        let addressed = route.and_then(|route| self.by_address[usize::from(route.da)]);
+        if let Some(listener) = addressed.filter(|slot| !self.curious.contains(slot)) {
+            heard |= self.deliver_to(listener.into(), sender, id, route);
         }
         if !heard {
             self.bus.unheard(id);
         }
     }
-    fn deliver_to(&mut self, listener: usize, sender: usize, id: FlightId, end: Time, route: Option<Route>) -> bool {
+    fn deliver_to(&mut self, listener: usize, sender: usize, id: FlightId, route: Option<Route>) -> bool {
         if listener == sender || !self.slots[listener].filter.passes(route) {
             return false;
         }
-        let delay = self.slots[listener].site.place.delay(self.slots[sender].site.place);
-        self.bus.add_listener(id);
-        self.push(end + delay, Phase::Telegram, listener, Event::Telegram(id));
+        self.bus.add_listeners(id, 1);
+        self.push_telegram(listener, id, Event::Telegram(id));
         true
+    }
+    /// A request for all passes every filter. Only the nearest neighbour is told now and tells the next one when it has
+    /// heard, so that the queue holds one event of the telegram, not one for each station.
+    fn broadcast(&mut self, sender: usize, id: FlightId) {
+        match self.neighbours[sender].len() {
+            0 => self.bus.unheard(id),
+            count => {
+                self.bus.add_listeners(id, count as u16);
+                self.tell_neighbour(id, 0);
+            }
+        }
+    }
+    fn tell_neighbour(&mut self, id: FlightId, rank: u8) {
+        if let Some(&listener) = self.neighbours[self.bus.flight(id).sender].get(usize::from(rank)) {
+            self.push_telegram(listener.into(), id, Event::Broadcast(id, rank));
+        }
+    }
+    /// The telegram's end reaches `listener`. Of telegrams that end there at one instant the one sent first comes first.
+    fn push_telegram(&mut self, listener: usize, id: FlightId, event: Event) {
+        let flight = self.bus.flight(id);
+        let listener = &self.slots[listener];
+        let at = flight.end + listener.site.place.delay(self.slots[flight.sender].site.place);
+        let key = Key::new(at, Phase::Telegram, listener.address.get(), flight.number);
+        self.queue.push(key, NetworkEvent(event));
+    }
+    /// All but `sender`, by delay and then by address, as events are ordered.
+    fn neighbours_of(&self, sender: usize) -> Vec<u8> {
+        let place = self.slots[sender].site.place;
+        let mut all: Vec<u8> = (0..self.slots.len() as u8).filter(|&slot| usize::from(slot) != sender).collect();
+        all.sort_by_key(|&slot| {
+            let slot = &self.slots[usize::from(slot)];
+            (slot.site.place.delay(place), slot.address)
+        });
+        all
     }
     fn sort_listeners(&mut self) {
         self.curious.clear();

@@ -1,9 +1,10 @@
 //! Build: from a scenario to a network that is ready to run, with the telegrams of a configuration tool.
 
-use crate::device::controller::{self, Controller};
+use crate::device::controller::{self, Controller, LifeSettings};
 use crate::device::drive::{Drive, Subscriber};
 use crate::device::encoder::{Disc, Encoder};
 use crate::device::node::{Command, Node};
+use crate::device::options::Resolution;
 use crate::device::unit::UnitSettings;
 use crate::dp::handler::SlaveParams;
 use crate::dp::iso::Rearm;
@@ -11,7 +12,7 @@ use crate::dp::master::{Master, Settings};
 use crate::observation::MasterMode;
 use crate::sim::bus::Place;
 use crate::sim::crystal::Crystal;
-use crate::sim::motion::{Resolution, Shaft};
+use crate::sim::motion::{self, Shaft};
 use crate::sim::network::{self, Act, Network, NetworkEvent, Site};
 use crate::sim::noise::{JitterSource, Purpose, Stream};
 use crate::sim::queue::Queue;
@@ -62,15 +63,17 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
 }
 
 fn user_block(slave: &Slave) -> UserPrm81 {
-    let device = slave.device;
+    let Resolution { steps_per_rev, revolutions } = slave.resolution();
+    let positions = u64::from(steps_per_rev) * u64::from(revolutions);
     let scaling = slave.scaling;
     UserPrm81 {
         options: EncoderOptions::default()
             .with(EncoderOptions::COUNTER_CLOCKWISE, slave.code_sequence == CodeSequence::Ccw)
             .with(EncoderOptions::ACTIVATE, slave.functions)
             .with(EncoderOptions::SCALING, scaling.is_some()),
-        units_per_revolution: scaling.map_or(device.steps_per_rev, |scaling| scaling.units_per_rev),
-        total_range: scaling.map_or(device.steps_per_rev * device.revolutions, |scaling| scaling.total_range),
+        units_per_revolution: scaling.map_or(steps_per_rev, |scaling| scaling.units_per_rev),
+        // Not in force without scaling.
+        total_range: scaling.map_or(positions.min(u32::MAX.into()) as u32, |scaling| scaling.total_range),
         max_failures: slave.max_life_failures,
         reserved: [0; 7],
     }
@@ -79,7 +82,7 @@ fn user_block(slave: &Slave) -> UserPrm81 {
 fn iso_block(scenario: &Scenario, slave: &Slave) -> IsoM {
     let device = slave.device;
     let units = |span: Span| (span.ticks() / Span::TICKS_PER_ISO_UNIT) as u32;
-    let t_dx = Plan::of(scenario).t_dx.ceil_to(Span::from_iso_units(1));
+    let t_dx = Plan::of(scenario).t_dx_told();
     IsoM {
         version: 1,
         t_base_dp: device.t_base_dp,
@@ -162,16 +165,18 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         dx_retries: master.dx_retries,
         lost_after: master.lost_after.min(u16::MAX.into()) as u16,
         clear_for: master.clear_for,
+        active_spare: master.active_spare,
         data_control_time: master.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
+    let life = LifeSettings { t_mapc: master.t_mapc, start: master.life_start, delay: master.life_delay };
     let addresses = slaves.iter().map(|slave| slave.address);
-    Master::new(settings, Controller::new(addresses, master.t_mapc, master.life_start))
+    Master::new(settings, Controller::new(addresses, life))
 }
 
 fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let settings = UnitSettings {
-        clock_tolerance: slave.clock_tolerance,
+        options: slave.options,
         ..UnitSettings::new(slave.address, scenario.bus.params.rate, slave.t_sdr)
     };
     let machine = if slave.silent {
@@ -179,15 +184,16 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     } else if slave.device.subscriber {
         Node::Drive(Drive::new(slave.device, settings, Subscriber::default()))
     } else {
-        Node::Encoder(Encoder::new(slave.device, settings, Disc::new(slave.device)))
+        Node::Encoder(Encoder::new(slave.device, settings, Disc::new(slave.device, &slave.options)))
     };
-    let resolution = Resolution::new(slave.device.steps_per_rev, slave.device.revolutions);
+    let Resolution { steps_per_rev, revolutions } = slave.resolution();
+    let resolution = motion::Resolution::new(steps_per_rev, revolutions);
     let shaft = Shaft::new(&slave.motion).expect("a checked motion");
     Site {
         machine,
         place: Place::at(slave.position_mm),
         crystal: crystal(scenario.run.seed, slave.address, slave.crystal),
-        shaft: Some((shaft, resolution.expect("a profile's disc"))),
+        shaft: Some((shaft, resolution.expect("a checked resolution"))),
         powered_at: Time::ZERO + slave.powered_at,
     }
 }
@@ -266,12 +272,12 @@ mod tests {
             },
             motion: Motion::Speed { start: crate::sim::motion::Angle::ZERO, micro_rpm: 1_500_000_000 },
             max_life_failures: 1,
-            clock_tolerance: 1,
             code_sequence: CodeSequence::Cw,
             functions: false,
             scaling: None,
             silent: false,
             powered_at: Span::ZERO,
+            options: crate::device::options::UnitOptions::default(),
         };
         let mut slaves: Vec<Slave> = (3..=10).map(|n| slave(n, "posital-ocd-dpb1b")).collect();
         slaves.push(slave(11, "subscriber-drive"));
@@ -294,6 +300,8 @@ mod tests {
                 gc_jitter: GcJitter::BoundedNormal { sigma: Span::from_ns(100), bound: Span::from_ns(400) },
                 accumulate: false,
                 life_start: 1,
+                life_delay: 0,
+                active_spare: false,
             },
             slaves,
             links: vec![Link {

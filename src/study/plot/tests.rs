@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::look::{WIDTH, text_width};
 use super::*;
-use crate::observation::{Disturbance, Inputs, Observation, Phase, PllState, SlaveCause, SlaveState};
+use crate::observation::{Disturbance, Inputs, Leds, Observation, Phase, PllState, SlaveCause, SlaveState};
 use crate::sim::crystal::Crystal;
 use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::time::{BitRate, Local, Time};
@@ -122,6 +122,7 @@ impl World {
             state: SlaveState::DataExch,
             phase,
             pll,
+            leds: if fault { Leds::NotAddressed } else { Leds::DataExchange },
             pll_error: age.filter(|&age| age > 0).map(|_| Span::from_ticks(error)),
             period: None,
             window: age.map(|_| Span::from_ticks(window)),
@@ -351,7 +352,10 @@ const WORDS: [(&str, &[&str]); 7] = [
     ("latch_skew.svg", &["Latch skew:", "latch skew [ns]", "cycles (logarithmic)", "p99.9 ", "cycles per column"]),
     ("pll_convergence.svg", &["PLL convergence:", "error and window [ns]", "cycles since", "± window", "locked at"]),
     ("t_dp_deviation.svg", &["T_DP deviation:", "T_DP deviation [ns]", "time [", "cycles (logarithmic)", "p99 "]),
-    ("timeline.svg", &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "telegram lost", "slave 3"]),
+    (
+        "timeline.svg",
+        &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "telegram disturbed", "slave 3", "LED flashing"],
+    ),
     ("publish_latency.svg", &["Publish latency:", "latency [us]", "Wire:", "Publish:", "Age at use:", "p99.9"]),
     ("bus_cycle.svg", &["Bus cycle:", "time from t0 [us]", "T_DP ", "T_O ", "T_I ", "T_DX ", "spare ", "SYNCH", "DXB"]),
     ("position.svg", &["Position:", "G1_XIST1 [steps]", "time ["]),
