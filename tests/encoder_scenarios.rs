@@ -272,36 +272,36 @@ fn read_parameters() {
 fn t_mapc() {
     use Phase::{Clock, MasterLife, Operation, SlaveLife};
     let run = Run::of(&scenario("t-mapc", &[]));
-    assert_eq!(run.phases_of(3), [(Clock, 11), (MasterLife, 28), (SlaveLife, 262), (Operation, 278)]);
-    let again = [(MasterLife, 601), (SlaveLife, 852), (Operation, 868)];
-    assert_eq!(run.phases_of(4)[2..], [&[(SlaveLife, 264), (Operation, 280)][..], &again].concat());
-    assert_eq!((run.row(3, 261).sls, run.row(3, 262).sls, run.row(3, 263).sls), (0, 1, 2));
+    assert_eq!(run.phases_of(3), [(Clock, 6), (MasterLife, 23), (SlaveLife, 257), (Operation, 273)]);
+    let again = [(MasterLife, 599), (SlaveLife, 850), (Operation, 866)];
+    assert_eq!(run.phases_of(4)[2..], [&[(SlaveLife, 262), (Operation, 278)][..], &again].concat());
+    assert_eq!((run.row(3, 256).sls, run.row(3, 257).sls, run.row(3, 258).sls), (0, 1, 2));
     // Each value of the master's is there for 14 cycles.
-    let steps: Vec<_> = (39..888).filter(|&cycle| run.row(3, cycle).mls != run.row(3, cycle - 1).mls).collect();
-    let on_time = |&&cycle: &&u64| (cycle - 38) % 14 == 0;
-    assert_eq!(steps.iter().filter(|cycle| !on_time(cycle)).collect::<Vec<_>>(), [&501], "the lost one is seen late");
+    let steps: Vec<_> = (34..888).filter(|&cycle| run.row(3, cycle).mls != run.row(3, cycle - 1).mls).collect();
+    let on_time = |&&cycle: &&u64| (cycle - 33) % 14 == 0;
+    assert_eq!(steps.iter().filter(|cycle| !on_time(cycle)).collect::<Vec<_>>(), [&496], "the lost one is seen late");
 
     // Twelve lost in the middle of a value: nothing. One lost at its beginning: one failure, ten good cycles repay it.
     let counters = |slave, cycles: std::ops::Range<u64>| -> Vec<u16> {
         cycles.map(|cycle| run.row(slave, cycle).life_counter).collect()
     };
-    assert!(counters(3, 280..500).iter().all(|&counter| counter == 0));
-    assert_eq!(counters(3, 499..512), [0, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0, 0]);
+    assert!(counters(3, 275..495).iter().all(|&counter| counter == 0));
+    assert_eq!(counters(3, 494..507), [0, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0, 0]);
     assert!(run.faults_of(3).is_empty());
     // The master counts the twelve missing replies.
     let tripped = run.events_of(2).filter_map(|row| match row.what {
         Observation::SlaveLife { slave, tripped: true, .. } => Some((slave.get(), row.cycle)),
         _ => None,
     });
-    assert_eq!(tripped.collect::<Vec<_>>(), [(3, 393), (4, 604)]);
+    assert_eq!(tripped.collect::<Vec<_>>(), [(3, 388), (4, 602)]);
 
-    assert_eq!((run.faults_of(4), counters(4, 599..602)), (vec![(601, 0x0F02)], vec![0, 10, 20]));
-    assert!(run.slave(4).filter(|row| (601..852).contains(&row.cycle)).all(|row| row.sls == 0));
+    assert_eq!((run.faults_of(4), counters(4, 597..600)), (vec![(599, 0x0F02)], vec![0, 10, 20]));
+    assert!(run.slave(4).filter(|row| (599..850).contains(&row.cycle)).all(|row| row.sls == 0));
     let starts: Vec<_> = (run.events_of(4))
-        .filter(|row| row.cycle > 600 && matches!(row.what, Observation::MasterLife { to: LifeState::Strict, .. }))
+        .filter(|row| row.cycle > 598 && matches!(row.what, Observation::MasterLife { to: LifeState::Strict, .. }))
         .map(|row| row.cycle)
         .collect();
-    assert_eq!(starts, [602, 628]);
+    assert_eq!(starts, [600, 626]);
 }
 
 #[test]
