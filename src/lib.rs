@@ -58,33 +58,55 @@
 //!
 //! # An encoder without a simulator
 //!
-//! The encoder alone, octet by octet, as firmware would drive it: the supply comes on, a telegram arrives, the answer
-//! leaves one T_SDR later.
+//! The encoder alone, octet by octet, as firmware would drive it: the supply comes on, telegrams arrive, each answer
+//! leaves one T_SDR later. Parameters, configuration, and the first Data_Exchange, which asks for the position:
 //!
 //! ```
 //! use isodp::device::encoder::{Disc, Encoder};
 //! use isodp::device::{profile, unit::UnitSettings};
 //! use isodp::fdl::{Heard, Input, Outbox, Station};
 //! use isodp::time::{BitRate, Local, Span, Tbit};
-//! use isodp::wire::Address;
+//! use isodp::wire::{Address, Fcb, Frame, Header, Sap, Service};
 //!
 //! let profile = profile::find("posital-ocd-dpb1b").expect("a known device");
-//! let address = Address::new(6).expect("an address");
-//! let settings = UnitSettings::new(address, BitRate::M12, Tbit(30));
+//! let [encoder_6, master_2] = [6, 2].map(|number| Address::new(number).expect("an address"));
+//! let settings = UnitSettings::new(encoder_6, BitRate::M12, Tbit(30));
 //! let mut encoder = Encoder::new(profile, settings, Disc::new(profile, &settings.options));
 //!
-//! let mut out = Outbox::new();
-//! encoder.step(Local::ZERO, Input::PowerOn, &mut out);
+//! let (mut now, mut out) = (Local::ZERO, Outbox::new());
+//! encoder.step(now, Input::PowerOn, &mut out);
 //!
-//! // Slave_Diag of master 2: the encoder waits for parameters.
-//! let request = [0x68, 0x05, 0x05, 0x68, 0x86, 0x82, 0x6D, 0x3C, 0x3E, 0xEF, 0x16];
-//! let now = Local::ZERO + Span::from_ms(1);
-//! out.clear();
-//! encoder.step(now, Input::Telegram(Heard { octets: &request, sample: 0 }), &mut out);
+//! // A request of master 2 to the encoder at address 6, whose shaft is at step 4096: the octets of the answer.
+//! let mut ask = |saps: Option<(Sap, Sap)>, du: &[u8]| {
+//!     let header = Header::request(encoder_6, master_2, Service::SrdHigh, Fcb::First);
+//!     let header = saps.map_or(header, |(to, from)| header.with_saps(to, from));
+//!     let mut request = Frame::new();
+//!     request.set_data(&header, du).expect("a telegram");
+//!     now += Span::from_ms(1);
+//!     out.clear();
+//!     encoder.step(now, Input::Telegram(Heard { octets: request.octets(), sample: 4096 }), &mut out);
+//!     let (send, answer) = out.sending().expect("an answer");
+//!     assert_eq!(send.at - now, BitRate::M12.span(Tbit(30)));
+//!     answer.octets().to_vec()
+//! };
 //!
-//! let (send, frame) = out.sending().expect("an answer");
-//! assert_eq!(send.at - now, BitRate::M12.span(Tbit(30)));
-//! assert_eq!(frame.octets()[9..15], [0x02, 0x05, 0x00, 0xFF, 0x06, 0xDF]);
+//! // Slave_Diag: the encoder waits for parameters.
+//! let diagnosis = ask(Some((Sap::SLAVE_DIAG, Sap::MASTER_MS0)), &[]);
+//! assert_eq!(diagnosis[9..15], [0x02, 0x05, 0x00, 0xFF, 0x06, 0xDF]);
+//!
+//! // Set_Prm (manual 3.1) and Chk_Cfg (manual 2.1.1) are answered with SC.
+//! let prm = [
+//!     0x88, 20, 1, 11, 0x06, 0xDF, 0x80, 0xC0, 0x00, 0x18, // lock, watchdog 200 ms, ident, group 8, IsoM
+//!     0x15, 0x81, 0, 0, 0x00, 0, 0, 0x20, 0, 2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, // user block: no scaling
+//!     0x1C, 0x04, 0, 0, 1, 0, 0, 0x05, 0xDC, 0, 16, 1, // T_BASE_DP 125 us, T_DP 2 ms, T_MAPC 1
+//!     0, 0, 0x05, 0xDC, 0, 1, 0, 8, 0, 0, 0x15, 0x0C, 0, 12, 0, 0, // T_I 125 us, T_O 1 ms, T_DX, T_PLL_W 1 us
+//! ];
+//! assert_eq!(ask(Some((Sap::SET_PRM, Sap::MASTER_MS0)), &prm), [0xE5]);
+//! assert_eq!(ask(Some((Sap::CHK_CFG, Sap::MASTER_MS0)), profile.config), [0xE5]);
+//!
+//! // Data_Exchange: STW2 = 0, G1_STW = 2000; ZSW2 = 0, G1_ZSW = 2000, G1_XIST1 left-justified, G1_XIST2.
+//! let inputs = &ask(None, &[0x00, 0x00, 0x20, 0x00])[7..19];
+//! assert_eq!(inputs, [0x00, 0x00, 0x20, 0x00, 0x00, 0x08, 0x00, 0x00, 0x00, 0x00, 0x10, 0x00]);
 //! ```
 
 extern crate alloc;

@@ -3,12 +3,15 @@
 mod cli;
 mod determinism;
 mod devices;
+mod encoder;
+mod encoder_scenarios;
 mod foreign;
 mod golden;
 mod layers;
 mod manual;
 mod options;
 mod props;
+mod rig;
 mod scenarios;
 mod startup;
 mod support;

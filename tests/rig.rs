@@ -83,7 +83,7 @@ impl Rig {
         let profile = profile::find("posital-ocd-dpb1b").expect("a known device");
         let settings = UnitSettings::new(address(ENCODER), BitRate::M12, Tbit(30));
         let mut rig = Self {
-            encoder: Encoder::new(profile, settings, Disc::new(profile)),
+            encoder: Encoder::new(profile, settings, Disc::new(profile, &settings.options)),
             now: Local::ZERO,
             raw: 0,
             seen: Vec::new(),

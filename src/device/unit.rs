@@ -237,7 +237,7 @@ impl<F: Function> Body<F> {
         let (t_dp, latch, set_point) = (iso.t_dp_units(), iso.t_i_units(), iso.t_o_units());
         let earliest = u64::from(iso.t_dx) + units(self.profile.t_o_min);
         let gap = units(self.profile.gap_min(slow));
-        let window = u64::from(iso.t_pll_w).max(units(self.profile.min_window));
+        let window = u64::from(iso.t_pll_w).max(units(self.settings.options.pll.min_window));
         let range = units(self.profile.t_dp_min)..=units(self.profile.t_dp_max);
         let rules = [
             (9, t_dp, range.contains(&t_dp), "T_DP [1/12 us] is within the device's range (manual 3.3.2)"),

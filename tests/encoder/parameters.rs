@@ -1,6 +1,7 @@
 //! Manual 3 and 5.1: every parameter, every rule broken by itself, and what becomes of it.
 
 use isodp::device::isochronous::IsoSettings;
+use isodp::device::options::UnitOptions;
 use isodp::observation::{ClockVerdict, Leds, Observation, SlaveState};
 use isodp::time::Span;
 use isodp::wire::prm::{Block, BlockType, IsoM, SetPrm, UserPrm81};
@@ -251,7 +252,7 @@ fn section_3_2_5_octet_24_is_the_number_of_tolerated_failures() {
         let du = prm(&[(24, tolerated)]);
         let set_prm = SetPrm::parse(&du).expect("parameters");
         let iso = IsoM::parse(&set_prm.blocks().nth(1).expect("a block").expect("a block")).expect("a block");
-        assert_eq!(IsoSettings::new(&iso, du[23], 1).life.tolerance, u16::from(tolerated));
+        assert_eq!(IsoSettings::new(&iso, du[23], &UnitOptions::default()).life.tolerance, u16::from(tolerated));
         let failures = super::start_up::failures_until_trip(&du);
         assert_eq!(failures, u32::from(tolerated) + 1, "octet 24 is {tolerated}");
     }

@@ -8,11 +8,13 @@ use crate::rig::{
     CFG, CHK_CFG, GET_CFG, MASTER, MS1, PRM, RD_INP, RD_OUTP, Reply, Rig, SET_PRM, SLAVE_DIAG, STRANGER, prm,
 };
 
+type Input = fn(&mut Rig) -> Reply;
+
 /// An input, tried in each state.
 #[derive(Clone, Copy)]
 struct Try {
     name: &'static str,
-    input: fn(&mut Rig) -> Reply,
+    input: Input,
     /// Answer and next state from WAIT_PRM, WAIT_CFG, DATA_EXCH.
     expected: [(Kind, SlaveState); 3],
 }
@@ -65,9 +67,6 @@ const fn exchanging(kind: Kind) -> [(Kind, SlaveState); 3] {
     [(Rs, WaitPrm), (Rs, WaitCfg), (kind, DataExch)]
 }
 
-/// A name, what is asked, and the kind of answer before and after.
-type Asked<'a> = (&'a str, &'a dyn Fn(&mut Rig) -> Reply, [Kind; 2]);
-
 #[test]
 fn section_2_1_1_states_and_telegrams_of_the_start_up() {
     let try_ = |name, input, expected| Try { name, input, expected };
@@ -111,20 +110,22 @@ fn section_2_states_and_telegrams_of_data_exchange() {
     ]);
 }
 
+fn other(rig: &mut Rig, saps: (Sap, Sap), du: &[u8]) -> Reply {
+    rig.srd_from(STRANGER, saps, du)
+}
 #[test]
 fn section_2_1_1_another_master_changes_nothing() {
-    let other = |rig: &mut Rig, saps, du: &[u8]| rig.srd_from(STRANGER, saps, du);
-    let tries: [Asked<'_>; 10] = [
-        ("Set_Prm", &|rig| other(rig, SET_PRM, &PRM), [Rs, Rs]),
-        ("bad Set_Prm", &|rig| other(rig, SET_PRM, &PRM[..9]), [Rs, Rs]),
-        ("Unlock", &|rig| other(rig, SET_PRM, &prm(&[(1, 0x40)])), [Rs, Rs]),
-        ("Chk_Cfg", &|rig| other(rig, CHK_CFG, &CFG), [Rs, Rs]),
-        ("bad Chk_Cfg", &|rig| other(rig, CHK_CFG, &[0]), [Rs, Rs]),
-        ("Data_Exchange", &|rig| rig.exchange_from(STRANGER, Service::SrdHigh, &[0; 4]), [Rs, Rs]),
-        ("Data_Exchange too long", &|rig| rig.exchange_from(STRANGER, Service::SrdHigh, &[0; 5]), [Rs, Rs]),
-        ("MS1", &|rig| other(rig, MS1, &[0x5E, 1, 47, 240]), [Rs, Rs]),
-        ("Slave_Diag", &|rig| other(rig, SLAVE_DIAG, &[]), [Data(6), Data(6)]),
-        ("RD_Inp", &|rig| other(rig, RD_INP, &[]), [Rs, Data(12)]),
+    let tries: [(&str, Input, [Kind; 2]); 10] = [
+        ("Set_Prm", |rig| other(rig, SET_PRM, &PRM), [Rs, Rs]),
+        ("bad Set_Prm", |rig| other(rig, SET_PRM, &PRM[..9]), [Rs, Rs]),
+        ("Unlock", |rig| other(rig, SET_PRM, &prm(&[(1, 0x40)])), [Rs, Rs]),
+        ("Chk_Cfg", |rig| other(rig, CHK_CFG, &CFG), [Rs, Rs]),
+        ("bad Chk_Cfg", |rig| other(rig, CHK_CFG, &[0]), [Rs, Rs]),
+        ("Data_Exchange", |rig| rig.exchange_from(STRANGER, Service::SrdHigh, &[0; 4]), [Rs, Rs]),
+        ("Data_Exchange too long", |rig| rig.exchange_from(STRANGER, Service::SrdHigh, &[0; 5]), [Rs, Rs]),
+        ("MS1", |rig| other(rig, MS1, &[0x5E, 1, 47, 240]), [Rs, Rs]),
+        ("Slave_Diag", |rig| other(rig, SLAVE_DIAG, &[]), [Data(6), Data(6)]),
+        ("RD_Inp", |rig| other(rig, RD_INP, &[]), [Rs, Data(12)]),
     ];
     for (name, input, expected) in tries {
         for (state, expected) in [WaitCfg, DataExch].into_iter().zip(expected) {

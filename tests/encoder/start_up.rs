@@ -13,6 +13,8 @@ const LOCK: u32 = 17;
 const ERROR: u16 = 0x8000;
 const ACKNOWLEDGE: u16 = 0x8000;
 
+type Way = fn(&mut Rig);
+
 /// Goes on undisturbed until this phase begins; the cycles that this took.
 pub(super) fn until(rig: &mut Rig, life: &mut Life, phase: Phase) -> u32 {
     for cycles in 0..700 {
@@ -58,9 +60,6 @@ fn sls(inputs: &Inputs81) -> u16 {
 fn with_t_mapc(n: u8) -> Vec<u8> {
     prm(&[(43, n)])
 }
-
-/// A name and what is done.
-type Way = (&'static str, fn(&mut Rig));
 
 #[test]
 fn section_2_1_2_the_clock_starts_with_operate_and_data_and_is_locked_after_17_synchs() {
@@ -212,7 +211,7 @@ fn section_2_1_2_a_lost_clock_is_fault_0f04_in_each_later_phase_and_everything_b
 #[test]
 fn section_2_1_1_every_phase_ends_with_data_exchange() {
     for phase in [Clock, MasterLife, SlaveLife, Operation] {
-        let ways: [Way; 5] = [
+        let ways: [(&str, Way); 5] = [
             ("watchdog", |rig| rig.advance(rig.now + T_DP * 101)),
             ("unlock", |rig| drop(rig.srd(SET_PRM, &prm(&[(1, 0x40)])))),
             ("new parameters", |rig| drop(rig.srd(SET_PRM, &PRM))),

@@ -353,7 +353,7 @@ fn window(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 fn delay(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
         // The delayed latch must lie before the next clock, which may come a window early.
-        let window = slave.times.t_pll_w.max(slave.device.min_window);
+        let window = slave.times.t_pll_w.max(slave.options.pll.min_window);
         let before_clock = (slave.times.t_i - window - Span::from_iso_units(1)).max(Span::ZERO);
         let max = Span::from_iso_units(u32::from(u16::MAX)).min(before_clock);
         iso_units(reader, slave, ("t_pll_d", slave.times.t_pll_d), Span::ZERO, max, "3.3.9, Model: D13");
