@@ -1,5 +1,6 @@
 //! The command line `isodp`.
 
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -8,9 +9,9 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isodp::sim::network::NetworkEvent;
 use isodp::sim::queue::NearQueue;
-use isodp::study::report;
 use isodp::study::run::{Outcome, Progress, run};
 use isodp::study::scenario::{Extent, Scenario};
+use isodp::study::{devices, report};
 use isodp::time::Span;
 
 /// A wrong call, scenario or file.
@@ -22,6 +23,8 @@ Examples:
       The main job: a complete network, its figures on screen, files under out/reference/.
   isodp run scenarios/reference.toml --seed 7 --out /tmp/results
       The same with other draws, files under /tmp/results/reference/.
+  isodp devices posital-ocd-dpb1b
+      What the profile of this device says; without a name, all devices.
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
 
@@ -40,6 +43,15 @@ enum Command {
     /// Runs a scenario and leaves figures, tables, histograms and plots.
     #[command(after_help = EXAMPLES)]
     Run(RunArgs),
+    /// Lists the devices that a scenario can name, or tells everything about one.
+    Devices(DevicesArgs),
+}
+
+#[derive(Args)]
+struct DevicesArgs {
+    /// The device to tell about.
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
 }
 
 #[derive(Args)]
@@ -48,7 +60,7 @@ struct RunArgs {
     #[arg(value_name = "FILE")]
     scenario: PathBuf,
     /// Seed of all random streams, instead of the scenario's.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Directory for the results; they go to DIR/<scenario>/.
     #[arg(long, value_name = "DIR", default_value = "out")]
@@ -65,17 +77,33 @@ fn assignment(text: &str) -> Result<(String, String), String> {
     }
 }
 
+fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("a seed is a whole number from 0 to {}", u64::MAX))
+}
+
 fn main() -> ExitCode {
-    let Command::Run(args) = Cli::parse().command;
-    match run_command(args) {
-        Ok(text) => {
-            anstream::print!("{text}");
-            ExitCode::SUCCESS
-        }
+    let result = match Cli::parse().command {
+        Command::Run(args) => run_command(args),
+        Command::Devices(args) => devices_command(args.name.as_deref()),
+    };
+    match result.and_then(|page| show(&page)) {
+        Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            anstream::eprintln!("error: {error}");
+            // Where standard error is gone too, the exit code is all that can be told.
+            let _ = writeln!(anstream::stderr(), "error: {error}");
             ExitCode::from(USAGE)
         }
+    }
+}
+
+/// Prints `page`. A reader that has seen enough and closes its end is fine.
+fn show(page: &str) -> Result<(), Box<dyn std::error::Error>> {
+    let mut out = anstream::stdout();
+    match out.write_all(page.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(format!("the files are written, but the page cannot be shown: {error}").into())
+        }
+        _ => Ok(()),
     }
 }
 
@@ -87,6 +115,10 @@ fn run_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
     let Outcome { summary, dir, .. } = run::<NearQueue<NetworkEvent>>(&scenario, Some(&args.out), |at| bar.show(at))?;
     bar.line.finish_and_clear();
     Ok(report::render(&summary, dir.as_ref().map(|dir| dir.display().to_string()).as_deref()))
+}
+
+fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
+    Ok(name.map_or_else(|| Ok(devices::list()), devices::full)?)
 }
 
 /// The progress bar; nothing where standard error is no terminal.

@@ -8,6 +8,8 @@ use core::fmt;
 
 use crate::time::{Local, Span};
 use crate::wire::Address;
+use crate::wire::acyclic::ErrorCode;
+use crate::wire::parameter::{self, ErrorNumber};
 
 macro_rules! named {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* }) => {
@@ -183,6 +185,49 @@ named! {
         InRing = "master, in ring",
     }
 }
+named! {
+    /// What the two LEDs in the connection cap show, red/green (manual 5.2).
+    Leds {
+        /// No supply.
+        NoSupply = "dark/dark",
+        /// Ready, but nothing configured it since power on.
+        NotConfigured = "bright/bright",
+        /// Parameters or configuration were refused.
+        Refused = "bright/flashing",
+        /// Ready, but its master does not exchange data with it.
+        NotAddressed = "flashing/bright",
+        /// Nothing came for a longer time.
+        Silence = "bright/dark",
+        /// Data exchange.
+        DataExchange = "dark/bright",
+    }
+}
+
+/// Why an acyclic request failed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum AcyclicFailure {
+    /// The slave's service access point is closed.
+    Closed,
+    /// Nothing came in time.
+    Timeout,
+    /// The slave left data exchange.
+    Left,
+    /// The slave refused it, with this class and code (DP-V1).
+    Refused(ErrorCode),
+    /// The answer cannot be read.
+    Unreadable,
+}
+impl fmt::Display for AcyclicFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Closed => f.write_str("its service access point is closed"),
+            Self::Timeout => f.write_str("no answer in time"),
+            Self::Left => f.write_str("it left data exchange"),
+            Self::Refused(code) => write!(f, "refused: {code}"),
+            Self::Unreadable => f.write_str("its answer cannot be read"),
+        }
+    }
+}
 
 /// Something a station saw or did. Instants are readings of the station's own crystal.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -280,6 +325,49 @@ pub enum Observation {
         held: bool,
     },
 
+    /// The master application asks a slave for parameters, or to change one.
+    ParameterRequest {
+        /// Whom.
+        slave: Address,
+        /// Parameter number.
+        pnu: u16,
+        /// First element.
+        subindex: u16,
+        /// Elements, 0 for a parameter that is no array.
+        elements: u8,
+        /// Change instead of read.
+        change: bool,
+    },
+    /// One value of a slave's answer.
+    ParameterValue {
+        /// Whose.
+        slave: Address,
+        /// Parameter number.
+        pnu: u16,
+        /// Element.
+        subindex: u16,
+        /// The value.
+        value: u32,
+    },
+    /// A parameter that a slave did not give or change.
+    ParameterError {
+        /// Whose.
+        slave: Address,
+        /// Parameter number.
+        pnu: u16,
+        /// Element asked for first.
+        subindex: u16,
+        /// Error number (PROFIdrive).
+        number: u16,
+    },
+    /// An acyclic request got no answer that could be used.
+    AcyclicFailed {
+        /// From whom.
+        slave: Address,
+        /// Why.
+        why: AcyclicFailure,
+    },
+
     // ----- slave
     /// A slave's DP state changed.
     SlaveState {
@@ -352,6 +440,18 @@ pub enum Observation {
         /// Code in `G1_XIST2` until now.
         code: u16,
     },
+    /// The LEDs show something else (manual 5.2).
+    Leds {
+        /// Before.
+        from: Leds,
+        /// Now.
+        to: Leds,
+    },
+    /// The supply was switched.
+    Power {
+        /// On or off.
+        on: bool,
+    },
 
     // ----- slave to slave
     /// A publisher's reply was taken over by a subscriber.
@@ -363,7 +463,7 @@ pub enum Observation {
     Used {
         /// Whose.
         publisher: Address,
-        /// The value [steps].
+        /// The value (steps).
         position: u32,
     },
     /// The state of a link changed.
@@ -452,6 +552,19 @@ impl fmt::Display for Observation {
             Self::MasterLifeHeld { slave, held } => {
                 write!(f, "master sign of life for {slave} {}", if *held { "held" } else { "running" })
             }
+            Self::ParameterRequest { slave, pnu, subindex, elements, change } => {
+                let verb = if *change { "change" } else { "read" };
+                write!(f, "slave {slave}: {verb} P{pnu}[{subindex}], {elements} elements, {}", parameter::name(*pnu))
+            }
+            Self::ParameterValue { slave, pnu, subindex, value } => {
+                let element = parameter::element(*pnu, *subindex);
+                write!(f, "slave {slave}: P{pnu}[{subindex}] = {value} ({value:X} hex), {element}")
+            }
+            Self::ParameterError { slave, pnu, subindex, number } => {
+                let name = ErrorNumber::from_code(*number).map_or("error not assigned", ErrorNumber::name);
+                write!(f, "slave {slave}: P{pnu}[{subindex}] error {number:02X}, {name}")
+            }
+            Self::AcyclicFailed { slave, why } => write!(f, "slave {slave}: acyclic request failed, {why}"),
             Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
             Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
             Self::Clock { verdict, error, window, counter, .. } => {
@@ -468,6 +581,8 @@ impl fmt::Display for Observation {
             Self::MasterLife { from, to } => write!(f, "master sign of life {from} -> {to}"),
             Self::Fault { code } => write!(f, "fault {code:04X}"),
             Self::Acknowledged { code } => write!(f, "fault {code:04X} acknowledged"),
+            Self::Leds { from, to } => write!(f, "LEDs red/green {from} -> {to}"),
+            Self::Power { on } => write!(f, "supply {}", if *on { "on" } else { "off" }),
             Self::Subscribed { publisher } => write!(f, "data of publisher {publisher}"),
             Self::Used { publisher, position } => write!(f, "position {position} of publisher {publisher} used"),
             Self::Link { publisher, from, to } => write!(f, "link to {publisher}: {from} -> {to}"),

@@ -51,19 +51,19 @@ impl Span {
     pub const fn ticks(self) -> i64 {
         self.0
     }
-    /// Length [ns], for display and statistics.
+    /// Length (ns), for display and statistics.
     pub fn as_ns(self) -> f64 {
         self.0 as f64 / Self::TICKS_PER_NS as f64
     }
-    /// Length [µs], for display and statistics.
+    /// Length (µs), for display and statistics.
     pub fn as_us(self) -> f64 {
         self.as_ns() / 1e3
     }
-    /// Length [ms], for display and statistics.
+    /// Length (ms), for display and statistics.
     pub fn as_ms(self) -> f64 {
         self.as_ns() / 1e6
     }
-    /// Length [s], for display and statistics.
+    /// Length (s), for display and statistics.
     pub fn as_s(self) -> f64 {
         self.as_ns() / 1e9
     }
@@ -236,7 +236,7 @@ impl<C> fmt::Debug for Instant<C> {
     }
 }
 
-/// A duration counted in bits [t_bit]. It becomes a [`Span`] only together with a [`BitRate`].
+/// A duration counted in bits (t_bit). It becomes a [`Span`] only together with a [`BitRate`].
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Debug)]
 pub struct Tbit(pub u32);
 

@@ -1,5 +1,17 @@
 //! The tests of the whole, in one binary.
 
+mod cli;
 mod determinism;
+mod devices;
+mod encoder;
+mod encoder_scenarios;
+mod foreign;
+mod golden;
 mod layers;
+mod manual;
+mod options;
+mod props;
+mod rig;
+mod scenarios;
+mod startup;
 mod support;

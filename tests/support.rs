@@ -3,19 +3,31 @@
 use std::path::PathBuf;
 
 use isodp::device::node::Node;
-use isodp::observation::Observation;
+use isodp::observation::{Observation, Phase};
 use isodp::sim::fingerprint::{Fingerprint, Fingerprints};
 use isodp::sim::network::{Network, NetworkEvent, Until};
 use isodp::sim::queue::{NearQueue, Queue};
 use isodp::sim::record::{Recorder, Stamp, Transmission};
 use isodp::study::build;
-use isodp::study::count::Counts;
+use isodp::study::count::{Counts, SlaveCounts};
 use isodp::study::metric::Metrics;
 use isodp::study::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
 use isodp::study::run;
 use isodp::study::scenario::{Extent, Scenario};
 use isodp::time::Time;
-use isodp::wire::Address;
+use isodp::wire::drive::Inputs81;
+use isodp::wire::{Address, Telegram};
+
+/// Names of all shipped scenarios, in order.
+pub(crate) fn shipped() -> Vec<String> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let files = std::fs::read_dir(folder).expect("scenarios").map(|entry| entry.expect("an entry").path());
+    let names = files.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    let mut names: Vec<_> =
+        names.map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
 
 /// The shipped scenario of this name, with changed values.
 pub(crate) fn scenario(name: &str, sets: &[(&str, &str)]) -> Scenario {
@@ -74,6 +86,46 @@ impl Run {
     /// The rows of one slave.
     pub(crate) fn slave(&self, number: u8) -> impl Iterator<Item = &SlaveRow> {
         self.slaves.iter().filter(move |row| row.slave == address(number))
+    }
+    /// The row of one slave in one cycle.
+    pub(crate) fn row(&self, number: u8, cycle: u64) -> &SlaveRow {
+        self.slave(number).find(|row| row.cycle == cycle).unwrap_or_else(|| panic!("slave {number} in cycle {cycle}"))
+    }
+    /// The cycles in which one slave entered the start-up phases.
+    pub(crate) fn phases_of(&self, number: u8) -> Vec<(Phase, u64)> {
+        let phase = |row: &EventRow| match row.what {
+            Observation::Phase { to, .. } => Some((to, row.cycle)),
+            _ => None,
+        };
+        self.events_of(number).filter_map(phase).collect()
+    }
+    /// The cycles in which one slave latched faults, with their codes.
+    pub(crate) fn faults_of(&self, number: u8) -> Vec<(u64, u16)> {
+        let fault = |row: &EventRow| match row.what {
+            Observation::Fault { code } => Some((row.cycle, code)),
+            _ => None,
+        };
+        self.events_of(number).filter_map(fault).collect()
+    }
+    /// What was counted for one slave.
+    pub(crate) fn counts_of(&self, number: u8) -> &SlaveCounts {
+        let counts = self.counts.as_ref().expect("the run is over");
+        counts.slaves.iter().find(|slave| slave.address == address(number)).expect("a slave")
+    }
+    /// Telegrams from the start of one cycle to the start of the next.
+    pub(crate) fn telegrams_in(&self, cycle: u64) -> impl Iterator<Item = &(Time, Time, Address, Vec<u8>)> {
+        let t0 = |cycle| self.cycles.iter().find(|row| row.cycle == cycle).map(|row| row.t0);
+        let (from, to) = (t0(cycle).expect("a cycle"), t0(cycle + 1).expect("another cycle"));
+        self.telegrams.iter().filter(move |(start, ..)| (from..to).contains(start))
+    }
+    /// Telegram 81 in the Data_Exchange reply of one slave in one cycle, if there was one.
+    pub(crate) fn reply(&self, number: u8, cycle: u64) -> Option<Inputs81> {
+        self.telegrams_in(cycle).find_map(|(_, _, sender, octets)| match Telegram::parse(octets) {
+            Ok(Telegram::Data { header, du }) if *sender == address(number) && header.dsap.is_none() => {
+                Inputs81::parse(du)
+            }
+            _ => None,
+        })
     }
     /// The events of one station.
     pub(crate) fn events_of(&self, number: u8) -> impl Iterator<Item = &EventRow> {

@@ -184,7 +184,7 @@ impl Slave {
         let (steps, revolutions) = (profile.steps_per_rev, profile.revolutions);
         let times = slave.times;
         let settings = PllSettings::new(scenario.master.t_dp, times.t_pll_w, times.t_pll_d);
-        let mut pll = Pll::new(PllSettings { tolerance: slave.clock_tolerance, ..settings });
+        let mut pll = Pll::new(PllSettings { tolerance: slave.options.clock_tolerance, ..settings });
         pll.start();
         let told = start.station(slave.address);
         Self {

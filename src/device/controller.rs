@@ -5,12 +5,15 @@
 
 use alloc::vec::Vec;
 
+use crate::device::parameter_client::ParameterClient;
 use crate::device::sign_of_life::{LifeSign, Monitor, MonitorSettings};
 use crate::dp::master::Application;
+use crate::dp::ms1::{Failure, Job};
 use crate::fdl::Outbox;
 use crate::observation::{LifeState, MasterMode, Observation};
 use crate::wire::Address;
 use crate::wire::drive::{G1Stw, Inputs81, Outputs81, Stw2};
+use crate::wire::parameter::{Format, ParameterAddress};
 
 /// Tolerated failures of a slave's sign of life (Model: D17).
 const TOLERANCE: u16 = 4;
@@ -28,8 +31,12 @@ pub enum Command {
     HoldLife(Address, Option<u32>),
     /// Count again.
     ReleaseLife(Address),
-    /// Go on counting from this value.
+    /// Send this value from the coming cycle on, for T_MAPC, and go on counting from it; 0 is followed by the start value.
     JumpLife(Address, u8),
+    /// Ask for a parameter over the parameter channel (manual 4).
+    ReadParameter(Address, ParameterAddress),
+    /// Ask to change a parameter to this value of this format.
+    ChangeParameter(Address, ParameterAddress, Format, u32),
 }
 
 impl Command {
@@ -40,9 +47,22 @@ impl Command {
             | Self::ControlWord(slave, _)
             | Self::HoldLife(slave, _)
             | Self::ReleaseLife(slave)
-            | Self::JumpLife(slave, _) => slave,
+            | Self::JumpLife(slave, _)
+            | Self::ReadParameter(slave, _)
+            | Self::ChangeParameter(slave, ..) => slave,
         }
     }
+}
+
+/// How the application counts its signs of life (Model: D17).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct LifeSettings {
+    /// Cycles per value, T_MAPC, 1..=14 (manual 3.3.3).
+    pub t_mapc: u8,
+    /// First value, 1..=15. Model: D17, default 1.
+    pub start: u8,
+    /// Cycles from a slave's data exchange in Operate to the first value. Model: D17, default 0.
+    pub delay: u32,
 }
 
 /// What the application keeps of one slave.
@@ -53,6 +73,10 @@ struct Axis {
     /// Own sign of life for this slave and the cycles for which it has been sent.
     sign: LifeSign,
     age: u8,
+    /// Cycles that the first value still waits.
+    wait: u32,
+    /// What the coming cycle sends instead.
+    jump: Option<LifeSign>,
     held: Held,
     control: G1Stw,
     acknowledge: u8,
@@ -72,25 +96,27 @@ enum Held {
 #[derive(Clone, Debug)]
 pub struct Controller {
     axes: Vec<Axis>,
-    t_mapc: u8,
-    start: LifeSign,
+    life: LifeSettings,
+    parameters: ParameterClient,
 }
 
 impl Controller {
-    /// An application for these slaves, counting every `t_mapc` cycles (1..=14) from `start` on (1..=15).
-    pub fn new(slaves: impl IntoIterator<Item = Address>, t_mapc: u8, start: u8) -> Self {
+    /// An application for these slaves.
+    pub fn new(slaves: impl IntoIterator<Item = Address>, life: LifeSettings) -> Self {
         let axis = |slave| Axis {
             slave,
             joined: false,
             sign: LifeSign::INVALID,
             age: 0,
+            wait: life.delay,
+            jump: None,
             held: Held::No,
             control: G1Stw::default(),
             acknowledge: 0,
             monitor: Monitor::new(MonitorSettings::new(1, TOLERANCE)),
             received: LifeSign::INVALID,
         };
-        Self { axes: slaves.into_iter().map(axis).collect(), t_mapc, start: LifeSign::new(start) }
+        Self { axes: slaves.into_iter().map(axis).collect(), life, parameters: ParameterClient::default() }
     }
     /// State of the check of a slave's sign of life.
     pub fn slave_life(&self, slave: Address) -> Option<LifeState> {
@@ -100,7 +126,7 @@ impl Controller {
 
 impl Axis {
     /// One cycle of the sign of life.
-    fn count(&mut self, t_mapc: u8, start: LifeSign, out: &mut Outbox) {
+    fn count(&mut self, life: LifeSettings, out: &mut Outbox) {
         if let Held::For(cycles) = self.held {
             if cycles == 0 {
                 self.hold(Held::No, out);
@@ -109,12 +135,16 @@ impl Axis {
             }
         }
         self.acknowledge = self.acknowledge.saturating_sub(1);
-        if !self.sign.is_valid() {
-            (self.sign, self.age) = (start, 0);
-        } else if self.held == Held::No && self.age + 1 >= t_mapc {
+        if let Some(sign) = self.jump.take() {
+            (self.sign, self.age) = (sign, 0);
+        } else if !self.sign.is_valid() && self.wait > 0 {
+            self.wait -= 1;
+        } else if !self.sign.is_valid() {
+            (self.sign, self.age) = (LifeSign::new(life.start), 0);
+        } else if self.held == Held::No && self.age + 1 >= life.t_mapc {
             (self.sign, self.age) = (self.sign.next(), 0);
         } else {
-            self.age = self.age.saturating_add(1).min(t_mapc - 1);
+            self.age = self.age.saturating_add(1).min(life.t_mapc - 1);
         }
     }
     fn hold(&mut self, held: Held, out: &mut Outbox) {
@@ -139,9 +169,9 @@ impl Application for Controller {
     fn cycle(&mut self, _cycle: u64, mode: MasterMode, out: &mut Outbox) {
         for axis in &mut self.axes {
             if axis.joined && mode == MasterMode::Operate {
-                axis.count(self.t_mapc, self.start, out);
+                axis.count(self.life, out);
             } else {
-                axis.sign = LifeSign::INVALID;
+                (axis.sign, axis.jump, axis.wait) = (LifeSign::INVALID, None, self.life.delay);
             }
         }
     }
@@ -162,7 +192,7 @@ impl Application for Controller {
         let axis = &mut self.axes[slave];
         let from = axis.monitor.state();
         axis.joined = joined;
-        axis.sign = LifeSign::INVALID;
+        (axis.sign, axis.wait) = (LifeSign::INVALID, self.life.delay);
         axis.received = LifeSign::INVALID;
         axis.monitor.reset();
         if from != LifeState::Waiting {
@@ -171,13 +201,63 @@ impl Application for Controller {
         }
     }
     fn command(&mut self, command: Command, out: &mut Outbox) {
-        let Some(axis) = self.axes.iter_mut().find(|axis| axis.slave == command.slave()) else { return };
+        let mut all = self.axes.iter_mut().enumerate();
+        let Some((slave, axis)) = all.find(|(_, axis)| axis.slave == command.slave()) else { return };
         match command {
             Command::Acknowledge(_) => axis.acknowledge = ACKNOWLEDGE_CYCLES + 1,
             Command::ControlWord(_, bits) => axis.control = bits,
             Command::HoldLife(_, cycles) => axis.hold(cycles.map_or(Held::ForGood, Held::For), out),
             Command::ReleaseLife(_) => axis.hold(Held::No, out),
-            Command::JumpLife(_, to) => (axis.sign, axis.age) = (LifeSign::new(to), 0),
+            Command::JumpLife(_, to) => axis.jump = Some(LifeSign::new(to)),
+            Command::ReadParameter(_, parameter) => {
+                self.parameters.ask((slave, axis.slave), parameter, None, out);
+            }
+            Command::ChangeParameter(_, parameter, format, value) => {
+                self.parameters.ask((slave, axis.slave), parameter, Some((format, value)), out);
+            }
         }
+    }
+    fn acyclic(&mut self) -> Option<Job> {
+        self.parameters.job()
+    }
+    fn acyclic_done(&mut self, _slave: usize, answer: Result<&[u8], Failure>, out: &mut Outbox) {
+        self.parameters.answered(answer, out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SLAVE: Address = Address::new(3).unwrap();
+
+    /// Signs of life sent in cycles 0.. at this T_MAPC; `order` is given before cycle 4 begins.
+    fn sent(t_mapc: u8, order: Command) -> [u8; 10] {
+        let mut out = Outbox::new();
+        let mut controller = Controller::new([SLAVE], LifeSettings { t_mapc, start: 1, delay: 0 });
+        controller.joined(0, true, &mut out);
+        core::array::from_fn(|cycle| {
+            if cycle == 4 {
+                controller.command(order, &mut out);
+            }
+            controller.cycle(cycle as u64, MasterMode::Operate, &mut out);
+            let mut du = [0; 4];
+            controller.outputs(0, &mut du);
+            du[0] >> 4
+        })
+    }
+
+    #[test]
+    fn a_jump_is_sent_itself_and_held_as_long_as_any_value() {
+        assert_eq!(sent(1, Command::JumpLife(SLAVE, 9)), [1, 2, 3, 4, 9, 10, 11, 12, 13, 14]);
+        assert_eq!(sent(2, Command::JumpLife(SLAVE, 9)), [1, 1, 2, 2, 9, 9, 10, 10, 11, 11]);
+        assert_eq!(sent(1, Command::JumpLife(SLAVE, 0)), [1, 2, 3, 4, 0, 1, 2, 3, 4, 5]);
+    }
+
+    #[test]
+    fn a_held_sign_of_life_goes_on_where_it_stopped() {
+        assert_eq!(sent(1, Command::HoldLife(SLAVE, Some(2))), [1, 2, 3, 4, 4, 4, 5, 6, 7, 8]);
+        assert_eq!(sent(2, Command::HoldLife(SLAVE, Some(2))), [1, 1, 2, 2, 2, 2, 3, 3, 4, 4]);
+        assert_eq!(sent(1, Command::HoldLife(SLAVE, None)), [1, 2, 3, 4, 4, 4, 4, 4, 4, 4]);
     }
 }

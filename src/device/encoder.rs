@@ -1,23 +1,30 @@
 //! The absolute encoder of the manuals: code sequence, scaling, preset and the format of its position words.
 
+use crate::device::options::{Resolution, UnitOptions};
+use crate::device::parameters::{DeviceIdentification, Parameters, Refused, SensorFormat};
 use crate::device::position::{CodeSequence, Position, Scaling};
 use crate::device::profile::Profile;
 use crate::device::sensor::Preset;
 use crate::device::unit::{Function, Unit};
 use crate::dp::slave::Refusal;
 use crate::time::Span;
+use crate::wire::Address;
+use crate::wire::acyclic::ErrorCode;
 use crate::wire::prm::{BlockType, SetPrm, UserPrm81};
 
 /// An absolute encoder on the bus.
 pub type Encoder = Unit<Disc>;
 
-/// Absolute preset and relative shift. Model: D21; no parameter of these devices is writable.
-const PRESET: i32 = 0;
+/// P922 (manual 2.2).
+const TELEGRAM: u16 = 81;
 
 /// What the encoder does with the raw position of its disc.
 #[derive(Clone, Debug)]
 pub struct Disc {
     profile: &'static Profile,
+    resolution: Resolution,
+    /// Absolute preset and relative shift. Model: D21; no parameter of these devices is writable.
+    preset_value: i32,
     position: Position,
 }
 
@@ -25,10 +32,18 @@ impl Disc {
     /// The disc of a device, unscaled and clockwise.
     ///
     /// # Panics
-    /// If the profile's disc has no position or more than 2^32: a mistake in the profile.
-    pub fn new(profile: &'static Profile) -> Self {
-        let position = Position::new(profile.steps_per_rev, profile.revolutions, CodeSequence::Cw, None);
-        Self { profile, position: position.expect("an unscaled disc breaks no rule") }
+    /// If the disc has no position or more than 2^32: a mistake in the profile or the options.
+    pub fn new(profile: &'static Profile, options: &UnitOptions) -> Self {
+        let resolution = options.resolution.unwrap_or(profile.resolution());
+        let position = Position::new(resolution.steps_per_rev, resolution.revolutions, CodeSequence::Cw, None);
+        let position = position.expect("an unscaled disc breaks no rule");
+        Self { profile, resolution, preset_value: options.preset_value, position }
+    }
+
+    /// P964. Model: the manuals print no values, so the manufacturer is 0 and the firmware as old as the manual.
+    const fn identification(&self) -> DeviceIdentification {
+        let device_type = self.profile.ident;
+        DeviceIdentification { manufacturer: 0, device_type, firmware: 0x0101, year: 2007, day_month: 101, axes: 1 }
     }
 
     /// The position that these parameters ask for (manual 3.2).
@@ -38,7 +53,8 @@ impl Disc {
         let scaling = user
             .scaled()
             .then_some(Scaling { units_per_rev: user.units_per_revolution, total_range: user.total_range });
-        Position::new(self.profile.steps_per_rev, self.profile.revolutions, code_sequence, scaling).map_err(|error| {
+        let Resolution { steps_per_rev, revolutions } = self.resolution;
+        Position::new(steps_per_rev, revolutions, code_sequence, scaling).map_err(|error| {
             let octet = error.octets().start;
             let value = if octet == 16 { user.units_per_revolution } else { user.total_range };
             let rule = "scaling fits the disc: units per revolution up to its steps, total range up to units x revolutions (manual 3.2.3, 3.2.4)";
@@ -84,10 +100,20 @@ impl Function for Disc {
         let value = self.position.value(raw);
         (self.position.xist1(value), self.position.xist2(value))
     }
+    fn parameters(&self, address: Address, request: &[u8], out: &mut [u8]) -> Result<usize, ErrorCode> {
+        let parameters = Parameters {
+            address,
+            telegram: TELEGRAM,
+            identification: self.identification(),
+            profile: Parameters::PROFILE,
+            format: SensorFormat::of(&self.position),
+        };
+        parameters.answer(request, out).map_err(|Refused(code)| code)
+    }
     fn preset(&mut self, preset: Preset, raw: u32) {
         match preset {
-            Preset::Absolute => self.position.preset_absolute(raw, PRESET),
-            Preset::Relative => self.position.preset_relative(PRESET),
+            Preset::Absolute => self.position.preset_absolute(raw, self.preset_value),
+            Preset::Relative => self.position.preset_relative(self.preset_value),
         }
     }
 }

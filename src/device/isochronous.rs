@@ -11,6 +11,7 @@
 //! | Operation | too many wrong signs of life | MasterLife, fault 0F02 |
 //! | any | end of data exchange | Configuration |
 
+use crate::device::options::{LifeStart, UnitOptions};
 use crate::device::pll::{Change, Judgement, Pll, PllSettings};
 use crate::device::sensor::Fault;
 use crate::device::sign_of_life::{Counter, Monitor, MonitorSettings, Verdict};
@@ -30,11 +31,13 @@ pub struct IsoSettings {
     pub t_i: Span,
     /// T_O, set point after the start of the cycle (manual 3.3.6).
     pub t_o: Span,
+    /// When the own sign of life starts (Model: D16).
+    pub life_start: LifeStart,
 }
 
 impl IsoSettings {
     /// Settings from the isochronous block and the tolerated failures (Set_Prm octets 32..=59 and 24).
-    pub fn new(iso: &IsoM, max_failures: u8, clock_tolerance: u8) -> Self {
+    pub fn new(iso: &IsoM, max_failures: u8, options: &UnitOptions) -> Self {
         let span = |units: u64| Span::from_ticks(units as i64 * Span::TICKS_PER_ISO_UNIT);
         let pll = PllSettings::new(
             span(iso.t_dp_units()),
@@ -42,10 +45,15 @@ impl IsoSettings {
             Span::from_iso_units(iso.t_pll_d.into()),
         );
         Self {
-            pll: PllSettings { tolerance: clock_tolerance, ..pll },
-            life: MonitorSettings::new(iso.t_mapc, max_failures.into()),
+            pll: PllSettings { tolerance: options.clock_tolerance, ..options.pll.on(pll) },
+            life: MonitorSettings {
+                steps: options.life.steps,
+                confirmation: options.life.confirmation,
+                ..MonitorSettings::new(iso.t_mapc, max_failures.into())
+            },
             t_i: span(iso.t_i_units()),
             t_o: span(iso.t_o_units()),
+            life_start: options.life.start,
         }
     }
 }
@@ -133,7 +141,7 @@ impl Isochronous {
             error: judgement.error,
             period: self.pll.period(),
             window: self.pll.window(),
-            counter: self.pll.failures(),
+            counter: judgement.counter,
         });
         self.observe_pll(before, out);
         match self.pll.window_end() {
@@ -179,7 +187,8 @@ impl Isochronous {
     pub fn set_point(&mut self, mls: u8, out: &mut Outbox) -> Option<Fault> {
         let before = self.life.state();
         let step = self.life.cycle(mls);
-        let sls = self.own.cycle(self.life.is_synchronised()).value();
+        let runs = self.life.is_synchronised() || self.settings.life_start == LifeStart::AfterClock;
+        let sls = self.own.cycle(runs).value();
         out.observe(Observation::SetPoint {
             mls,
             sls,

@@ -3,6 +3,7 @@
 use crate::device::controller::{Command as ControllerCommand, Controller};
 use crate::device::drive::Drive;
 use crate::device::encoder::Encoder;
+use crate::dp::handler::{Patch, StartupTelegram};
 use crate::dp::master::{Master, Order};
 use crate::fdl::{Filter, Input, Outbox, Station};
 use crate::observation::MasterMode;
@@ -13,6 +14,8 @@ use crate::wire::Address;
 pub enum Command {
     /// Clear or Operate, to the master.
     Mode(MasterMode),
+    /// A slave is started anew with a changed telegram.
+    Patch(Address, StartupTelegram, Patch),
     /// Something for the master's application.
     Application(ControllerCommand),
 }
@@ -55,6 +58,7 @@ impl Station for Node {
             Self::Master(master) => {
                 let input = input.map_command(|command| match command {
                     Command::Mode(mode) => Some(Order::Mode(mode)),
+                    Command::Patch(slave, telegram, patch) => Some(Order::Patch(slave, telegram, patch)),
                     Command::Application(command) => Some(Order::Application(command)),
                 });
                 if let Some(input) = input {

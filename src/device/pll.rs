@@ -223,6 +223,8 @@ pub struct Judgement {
     pub error: Span,
     /// What it changed.
     pub change: Change,
+    /// Failure counter with this verdict, 0 unless locked; where lock was lost, the one that was too much.
+    pub counter: u16,
 }
 
 /// The clock recovery of one slave. Instants are of its own crystal, within ± 2^61 ticks (6 years).
@@ -427,7 +429,7 @@ impl Pll {
 
     /// Stores a state and names what that changed.
     fn enter(&mut self, next: State, verdict: ClockVerdict, error: Fine) -> Judgement {
-        let before = self.state();
+        let (before, failures) = (self.state(), self.failures());
         self.state = next;
         let change = match (before, self.state()) {
             (PllState::Narrowing | PllState::Settling, PllState::Locked) => Change::Locked,
@@ -435,7 +437,8 @@ impl Pll {
             (PllState::Narrowing | PllState::Settling, PllState::Waiting) => Change::Restarted,
             _ => Change::None,
         };
-        Judgement { verdict, error: Span::from_ticks(error.round()), change }
+        let counter = if change == Change::Lost { failures + FAILURE_WEIGHT } else { self.failures() };
+        Judgement { verdict, error: Span::from_ticks(error.round()), change, counter }
     }
 }
 
@@ -689,6 +692,8 @@ mod tests {
         }
         let mut pll = in_state(PllState::Locked);
         assert!(run(&mut pll, 0, 2));
+        let mut pll = in_state(PllState::Locked);
+        assert_eq!([miss(&mut pll).counter, miss(&mut pll).counter, pll.failures()], [10, 20, 0]);
     }
 
     #[test]

@@ -162,6 +162,11 @@ impl Position {
         32 - bits.clamp(1, 32)
     }
 
+    /// Bits by which G1_XIST2 is shifted left, as P979 reports it (manual 2.2; Model: D23).
+    pub const fn xist2_shift(&self) -> u32 {
+        0
+    }
+
     /// G1_XIST1: the position value, left justified (manual 2.2).
     pub fn xist1(&self, value: u32) -> u32 {
         value << self.xist1_shift()
@@ -169,7 +174,17 @@ impl Position {
 
     /// G1_XIST2 without error: the position value, right justified, shift 0 (manual 2.2; Model: D23).
     pub fn xist2(&self, value: u32) -> u32 {
-        value
+        value << self.xist2_shift()
+    }
+
+    /// Values in a revolution (steps, or units when scaled), as P979 reports them.
+    pub fn values_per_rev(&self) -> u32 {
+        self.scaling.map_or(self.steps_per_rev, |scaling| scaling.units_per_rev)
+    }
+
+    /// Whole revolutions that the value tells apart, as P979 reports them; none if its range ends within the first.
+    pub fn whole_revolutions(&self) -> u32 {
+        self.scaling.map_or(self.revolutions, |scaling| scaling.total_range / scaling.units_per_rev)
     }
 
     /// Sets the home position: from now on `raw` (steps) reads `preset` (steps or units), modulo the range.

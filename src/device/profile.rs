@@ -1,5 +1,6 @@
 //! Device profiles: what a configuration tool knows about a device from its GSD file and its manual.
 
+use crate::device::options::Resolution;
 use crate::fdl::params::BusParams;
 use crate::time::{BitRate, Span, Tbit};
 
@@ -58,6 +59,10 @@ impl Profile {
     /// MaxTsdr, the longest T_SDR at `rate` (t_bit).
     pub const fn max_tsdr(&self, rate: BitRate) -> Tbit {
         self.max_tsdr[rate as usize]
+    }
+    /// Disc and gear, where the type key says nothing else.
+    pub const fn resolution(&self) -> Resolution {
+        Resolution { steps_per_rev: self.steps_per_rev, revolutions: self.revolutions }
     }
     /// Step of T_DP.
     pub const fn dp_grid(&self) -> Span {

@@ -6,13 +6,17 @@
 //! the next request will find (Model: D8, D10).
 
 use crate::device::isochronous::{IsoSettings, Isochronous};
+use crate::device::leds::{LedInput, LedLogic};
+use crate::device::options::UnitOptions;
 use crate::device::profile::Profile;
 use crate::device::sensor::{Answer, Fault, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
+use crate::dp::ms1::Records;
 use crate::dp::slave::{Application, Identity, Refusal, Slave};
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
-use crate::observation::{self, Observation, Phase, SlaveState};
+use crate::observation::{self, Leds, Observation, Phase, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::Address;
+use crate::wire::acyclic::{ErrorCode, Record};
 use crate::wire::drive::{G1Zsw, Inputs81, Outputs81, Zsw2};
 use crate::wire::prm::{Block, BlockType, IsoM, SetPrm};
 
@@ -27,12 +31,20 @@ pub trait Function {
     fn parameterise(&mut self, prm: &SetPrm<'_>, watchdog: Option<Span>);
     /// Tolerated failures of the master's sign of life that these parameters ask for (manual 3.2.5).
     fn max_failures(prm: &SetPrm<'_>) -> u8;
-    /// Whether these parameters switch on what takes the longer computing time (manual 3.2.2).
+    /// Whether these parameters enable scaling, preset and code sequence, which take the longer computing time (manual
+    /// 3.2.2).
     fn slow(prm: &SetPrm<'_>) -> bool;
-    /// G1_XIST1 and the right-justified position for G1_XIST2 at this raw position [steps].
+    /// G1_XIST1 and the right-justified position for G1_XIST2 at this raw position (steps).
     fn position(&self, raw: u32) -> (u32, u32);
     /// Sets the position (manual 2.2, G1_STW bits 11 and 12) at this raw position.
     fn preset(&mut self, preset: Preset, raw: u32);
+    /// Answers a request of the parameter channel (manual 4). Returns the length of the answer (octets).
+    ///
+    /// # Errors
+    /// Class and code of the negative answer.
+    fn parameters(&self, _address: Address, _request: &[u8], _out: &mut [u8]) -> Result<usize, ErrorCode> {
+        Err(ErrorCode::NOT_SUPPORTED)
+    }
     /// T_O came.
     fn set_point(&mut self, _now: Local, _out: &mut Outbox) {}
     /// A publisher's reply was heard.
@@ -54,8 +66,15 @@ pub struct UnitSettings {
     pub rate: BitRate,
     /// Own T_SDR (Model: D2).
     pub t_sdr: Tbit,
-    /// Tolerated clock failures (Model: D15).
-    pub clock_tolerance: u8,
+    /// Where this unit differs from others.
+    pub options: UnitOptions,
+}
+
+impl UnitSettings {
+    /// Settings with the defaults of the model.
+    pub fn new(address: Address, rate: BitRate, t_sdr: Tbit) -> Self {
+        Self { address, rate, t_sdr, options: UnitOptions::default() }
+    }
 }
 
 /// A complete isochronous slave.
@@ -63,15 +82,17 @@ pub struct UnitSettings {
 pub struct Unit<F> {
     slave: Slave,
     body: Body<F>,
+    leds: LedLogic,
 }
 
 /// The unit behind its DP slave.
 #[derive(Clone, Debug)]
 struct Body<F> {
     profile: &'static Profile,
-    clock_tolerance: u8,
+    settings: UnitSettings,
     iso: Option<Isochronous>,
     sensor: Sensor,
+    channel: Channel,
     function: F,
     outputs: Outputs81,
     /// Raw position of the last latch, for a preset.
@@ -100,9 +121,10 @@ impl<F: Function> Unit<F> {
         };
         let body = Body {
             profile,
-            clock_tolerance: settings.clock_tolerance,
+            settings,
             iso: None,
-            sensor: Sensor::new(SensorOptions::default()),
+            sensor: Sensor::new(settings.options.sensor),
+            channel: Channel::EMPTY,
             function,
             outputs: Outputs81::default(),
             raw: 0,
@@ -110,7 +132,7 @@ impl<F: Function> Unit<F> {
             answer: Answer::NONE,
             inputs: Inputs81::default(),
         };
-        Self { slave: Slave::new(identity), body }
+        Self { slave: Slave::new(identity), body, leds: LedLogic::default() }
     }
     /// The DP slave.
     pub const fn slave(&self) -> &Slave {
@@ -119,6 +141,20 @@ impl<F: Function> Unit<F> {
     /// Start-up phase now.
     pub fn phase(&self) -> Phase {
         self.body.iso.as_ref().map_or(Phase::Configuration, Isochronous::phase)
+    }
+    /// What the LEDs show.
+    pub const fn leds(&self) -> Leds {
+        self.leds.leds()
+    }
+    fn update_leds(&mut self, now: Local, heard: bool, out: &mut Outbox) {
+        let input = LedInput { powered: true, state: self.slave.state(), fault: self.slave.has_fault(), heard };
+        let before = self.leds.next_deadline();
+        if let Some((from, to)) = self.leds.update(now, input) {
+            out.observe(Observation::Leds { from, to });
+        }
+        if let Some(deadline) = self.leds.next_deadline().filter(|&deadline| before != Some(deadline)) {
+            out.arm(Timer::Leds, deadline);
+        }
     }
     /// What the next request will find.
     pub const fn inputs(&self) -> &Inputs81 {
@@ -131,7 +167,8 @@ impl<F: Function> Body<F> {
         if let Some(mut iso) = self.iso.take() {
             iso.leave(out);
         }
-        self.sensor = Sensor::new(SensorOptions::default());
+        self.sensor = Sensor::new(self.settings.options.sensor);
+        self.channel = Channel::EMPTY;
         self.causes = Faults::NONE;
         self.answer = Answer::NONE;
         self.outputs = Outputs81::default();
@@ -200,6 +237,7 @@ impl<F: Function> Body<F> {
         let (t_dp, latch, set_point) = (iso.t_dp_units(), iso.t_i_units(), iso.t_o_units());
         let earliest = u64::from(iso.t_dx) + units(self.profile.t_o_min);
         let gap = units(self.profile.gap_min(slow));
+        let window = u64::from(iso.t_pll_w).max(units(self.settings.options.pll.min_window));
         let range = units(self.profile.t_dp_min)..=units(self.profile.t_dp_max);
         let rules = [
             (9, t_dp, range.contains(&t_dp), "T_DP [1/12 us] is within the device's range (manual 3.3.2)"),
@@ -224,11 +262,56 @@ impl<F: Function> Body<F> {
                 iso.t_pll_w <= self.profile.t_pll_w_max,
                 "T_PLL_W [1/12 us] is not above T_PLL_W_MAX (GSD)",
             ),
+            (
+                26,
+                u64::from(iso.t_pll_d),
+                u64::from(iso.t_pll_d) + window < latch,
+                "T_PLL_D [1/12 us] leaves the delayed latch before the next clock (manual 3.3.9, Model: D13)",
+            ),
         ];
         match rules.into_iter().find(|&(.., good, _)| !good) {
             Some((offset, value, _, rule)) => Err(Refusal::Device { octet: block.octet + offset, rule, value }),
             None => Ok(()),
         }
+    }
+}
+
+/// The parameter channel: the answer to the request written last.
+#[derive(Clone, Debug)]
+struct Channel {
+    octets: [u8; Self::MAX],
+    len: Option<usize>,
+}
+
+impl Channel {
+    /// Octets of the longest answer (C1_Max_Data_Len of the encoders).
+    const MAX: usize = 240;
+    const EMPTY: Self = Self { octets: [0; Self::MAX], len: None };
+    /// The slot of the telegram's module (manual 6.3).
+    const SLOT: u8 = 1;
+
+    fn check(record: Record) -> Result<(), ErrorCode> {
+        match (record.slot, record.index) {
+            (Self::SLOT, Record::PARAMETER_CHANNEL) => Ok(()),
+            (Self::SLOT, _) => Err(ErrorCode::INDEX),
+            _ => Err(ErrorCode::SLOT),
+        }
+    }
+}
+
+impl<F: Function> Records for Body<F> {
+    fn read(&mut self, record: Record, out: &mut [u8]) -> Result<usize, ErrorCode> {
+        Channel::check(record)?;
+        let len = self.channel.len.ok_or(ErrorCode::STATE_CONFLICT)?;
+        out.get_mut(..len).ok_or(ErrorCode::READ_CONSTRAINT)?.copy_from_slice(&self.channel.octets[..len]);
+        Ok(len)
+    }
+    fn write(&mut self, record: Record, data: &[u8]) -> Result<(), ErrorCode> {
+        Channel::check(record)?;
+        self.channel.len = None;
+        let len = self.function.parameters(self.settings.address, data, &mut self.channel.octets)?;
+        self.channel.len = Some(len);
+        Ok(())
     }
 }
 
@@ -262,7 +345,9 @@ impl<F: Function> Application for Body<F> {
         let iso = iso_block(prm).ok().flatten().filter(|_| prm.dpv1.isom_req());
         self.iso = iso
             .and_then(|block| IsoM::parse(&block).ok())
-            .map(|iso| Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), self.clock_tolerance)));
+            .map(|iso| Isochronous::new(IsoSettings::new(&iso, F::max_failures(prm), &self.settings.options)));
+        let preset_enabled = self.settings.options.sensor.preset_enabled && F::slow(prm);
+        self.sensor = Sensor::new(SensorOptions { preset_enabled, ..self.settings.options.sensor });
         self.function.parameterise(prm, watchdog);
     }
     fn enter(&mut self, _now: Local, out: &mut Outbox) {
@@ -280,6 +365,8 @@ impl<F: Function> Application for Body<F> {
             iso.exchanged(out);
         }
         if !self.is_locked() {
+            // A preset is about the position that this reply carries.
+            self.raw = sample;
             self.take_over(out);
             self.latch(sample, false, out);
         }
@@ -315,8 +402,10 @@ impl<F: Function> Station for Unit<F> {
         self.slave.filter(&self.body)
     }
     fn step(&mut self, now: Local, input: Input<'_, Self::Command>, out: &mut Outbox) {
+        let heard = matches!(input, Input::Telegram(_));
         match input {
             Input::PowerOn => {
+                self.leds = LedLogic::default();
                 self.body.reset(out);
                 self.body.function.leave(out);
                 self.slave.power_on(now, &mut self.body, out);
@@ -329,5 +418,6 @@ impl<F: Function> Station for Unit<F> {
             Input::Deadline { .. } | Input::Sent | Input::Sample(_) => {}
             Input::Command(never) => match never {},
         }
+        self.update_leds(now, heard, out);
     }
 }

@@ -45,6 +45,50 @@ pub struct SlaveParams {
     pub get_cfg: bool,
 }
 
+/// A change to a telegram of the start-up, for trying how a slave takes wrong ones.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Patch {
+    octets: [Option<(u8, u8)>; Self::MAX],
+    length: Option<u8>,
+}
+
+impl Patch {
+    /// Octets that one patch changes at most.
+    pub const MAX: usize = 8;
+
+    /// Sets octet number `octet` (from 1) to `value`. False if the patch is full.
+    pub fn set(&mut self, octet: u8, value: u8) -> bool {
+        let free = self.octets.iter_mut().find(|place| place.is_none());
+        free.map(|place| *place = Some((octet, value))).is_some()
+    }
+    /// Cuts the data unit off after, or fills it with zeros up to, `length` octets.
+    pub fn set_length(&mut self, length: u8) {
+        self.length = Some(length);
+    }
+    /// The data unit with the changes.
+    fn apply(&self, good: &[u8]) -> Vec<u8> {
+        let mut du = good.to_vec();
+        if let Some(length) = self.length {
+            du.resize(length.into(), 0);
+        }
+        for (octet, value) in self.octets.into_iter().flatten() {
+            if let Some(place) = du.get_mut(usize::from(octet).wrapping_sub(1)) {
+                *place = value;
+            }
+        }
+        du
+    }
+}
+
+/// Which telegram of the start-up.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum StartupTelegram {
+    /// Set_Prm.
+    Prm,
+    /// Chk_Cfg.
+    Cfg,
+}
+
 /// An answer to a service of the start-up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Answer<'a> {
@@ -62,6 +106,9 @@ pub enum Answer<'a> {
 #[derive(Clone, Debug)]
 pub struct Handler {
     params: SlaveParams,
+    /// Set_Prm and Chk_Cfg as they are sent: patched or not.
+    prm: Vec<u8>,
+    cfg: Vec<u8>,
     state: HandlerState,
     /// Cycles in a row in which Data_Exchange was not answered.
     missed: u16,
@@ -71,8 +118,9 @@ pub struct Handler {
 
 impl Handler {
     /// A handler that has not asked yet.
-    pub const fn new(params: SlaveParams) -> Self {
-        Self { params, state: HandlerState::Diagnose, missed: 0, reported: None }
+    pub fn new(params: SlaveParams) -> Self {
+        let (prm, cfg) = (params.prm.clone(), params.cfg.clone());
+        Self { params, prm, cfg, state: HandlerState::Diagnose, missed: 0, reported: None }
     }
     /// What the master knows beforehand.
     pub const fn params(&self) -> &SlaveParams {
@@ -94,8 +142,8 @@ impl Handler {
                 (SLAVE_DIAG, &[], Diagnosis::LEN)
             }
             HandlerState::GetCfg => (GET_CFG, &[], self.params.cfg.len()),
-            HandlerState::SetPrm => (SET_PRM, &self.params.prm, 0),
-            HandlerState::ChkCfg => (CHK_CFG, &self.params.cfg, 0),
+            HandlerState::SetPrm => (SET_PRM, &self.prm, 0),
+            HandlerState::ChkCfg => (CHK_CFG, &self.cfg, 0),
         }
     }
     /// Data_Exchange with this slave.
@@ -151,6 +199,14 @@ impl Handler {
         self.missed = self.missed.saturating_add(1);
         out.observe(Observation::NoAnswer { slave: self.params.address });
         self.missed >= lost_after && self.refused(out)
+    }
+    /// From now on sends this telegram changed, and starts over.
+    pub fn patch(&mut self, telegram: StartupTelegram, patch: &Patch, out: &mut Outbox) {
+        match telegram {
+            StartupTelegram::Prm => self.prm = patch.apply(&self.params.prm),
+            StartupTelegram::Cfg => self.cfg = patch.apply(&self.params.cfg),
+        }
+        self.restart(out);
     }
     /// Starts over, as after a stop of the master.
     pub fn restart(&mut self, out: &mut Outbox) {

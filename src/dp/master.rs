@@ -7,22 +7,29 @@
 //!       t0                               T_DX
 //! ```
 //!
+//! The acyclic message is one service for a slave that starts up, or one of the acyclic job; where the mode has to be
+//! told, a Global_Control comes before it. A slave that gets on is served until it exchanges data, then the next one: from Set_Prm on its watchdog
+//! runs, and a cycle has time for one service only.
+//!
 //! | part | ends with | next part |
 //! |---|---|---|
 //! | Starting | token claimed | Spare, first SYNCH one T_DP later |
 //! | Spare | `Schedule` due | Clock: SYNCH on its way |
 //! | Clock | its last bit has left | Exchange with the first slave |
-//! | Exchange | answer or none after the repeats | Exchange with the next slave, Acyclic after the last |
-//! | Acyclic | answer, or end of a Global_Control | Gap |
-//! | Gap | answer or none | Spare, the token sent |
+//! | Exchange | answer or none after the repeats | Exchange with the next slave; after the last Control, Startup or Acyclic |
+//! | Control | end of the Global_Control | Startup or Acyclic |
+//! | Startup, Acyclic | answer or none | Gap |
+//! | Gap | answer or none | Spare, the token sent; Token where the spare time is active |
+//! | Token | `Schedule` due | Token, another token sent, while one fits; then Spare |
 //!
 //! A part that has nothing to do, or whose longest course would not end before the next SYNCH, is left out.
 
 use alloc::vec::Vec;
 
 use crate::dp::GLOBAL_CONTROL;
-use crate::dp::handler::{Answer, Handler, SlaveParams};
+use crate::dp::handler::{Answer, Handler, Patch, SlaveParams, StartupTelegram};
 use crate::dp::iso::{CycleClock, Rearm};
+use crate::dp::ms1::{Client, Failure, Job, MS1, Progress};
 use crate::fdl::active::{Active, Confirm, Request};
 use crate::fdl::params::BusParams;
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
@@ -31,6 +38,8 @@ use crate::time::{Local, Span};
 use crate::wire::control::GlobalControl;
 use crate::wire::{Address, Service, Status};
 
+/// C1_Response_Timeout (SIEM80F9.GSE).
+const C1_RESPONSE_TIMEOUT: Span = Span::from_s(10);
 /// Characters of a Global_Control telegram.
 const GC_OCTETS: usize = 13;
 /// Characters of a telegram around its data unit, with and without SAPs.
@@ -52,6 +61,10 @@ pub trait Application {
     fn inputs(&mut self, slave: usize, inputs: Option<&[u8]>, out: &mut Outbox);
     /// A slave joined data exchange, or left it.
     fn joined(&mut self, slave: usize, joined: bool, out: &mut Outbox);
+    /// The next acyclic job, if there is one. Asked whenever the one before is over.
+    fn acyclic(&mut self) -> Option<Job>;
+    /// An acyclic job is over: the slave's answer, or why there is none.
+    fn acyclic_done(&mut self, slave: usize, answer: Result<&[u8], Failure>, out: &mut Outbox);
     /// The scenario orders something.
     fn command(&mut self, command: Self::Command, out: &mut Outbox);
 }
@@ -61,6 +74,8 @@ pub trait Application {
 pub enum Order<C> {
     /// Another operation mode: Clear or Operate.
     Mode(MasterMode),
+    /// A slave is started anew, with this telegram changed.
+    Patch(Address, StartupTelegram, Patch),
     /// Something for its application.
     Application(C),
 }
@@ -82,6 +97,8 @@ pub struct Settings {
     pub lost_after: u16,
     /// Cycles in Clear before Operate.
     pub clear_for: u64,
+    /// Whether further tokens to itself fill the spare time as far as they fit (Model: D6).
+    pub active_spare: bool,
     /// Data_Control_Time; the mode is told to the slaves at least every third of it (Model: D5).
     pub data_control_time: Span,
     /// The slaves, in the order in which they are polled.
@@ -97,9 +114,13 @@ enum Part {
     Exchange(usize),
     /// The start-up service of the slave of this index.
     Startup(usize),
+    /// A request or poll of the acyclic job.
+    Acyclic,
     /// Global_Control is on its way.
     Control,
     Gap(Address),
+    /// A further token in active spare time.
+    Token,
 }
 
 /// A class 1 master.
@@ -125,6 +146,7 @@ pub struct Master<A> {
     control_every: u64,
     /// Where the search for the next slave in start-up begins.
     startup_next: usize,
+    ms1: Client,
 }
 
 impl<A: Application> Master<A> {
@@ -145,8 +167,10 @@ impl<A: Application> Master<A> {
             retries: 0,
             control_due: true,
             control_told: 0,
-            control_every: third.div_floor(settings.t_dp).max(1) as u64,
+            // Never in every cycle: slaves start up in the acyclic part too.
+            control_every: third.div_floor(settings.t_dp).max(2) as u64,
             startup_next: 0,
+            ms1: Client::new(C1_RESPONSE_TIMEOUT),
             settings,
         }
     }
@@ -193,6 +217,10 @@ impl<A: Application> Master<A> {
                 self.startup_answered(slave, confirm, out);
                 self.gap(out);
             }
+            (Part::Acyclic, confirm) => {
+                self.acyclic_answered(now, confirm, out);
+                self.gap(out);
+            }
             (Part::Gap(address), Confirm::Gap(answer)) => {
                 out.observe(Observation::Gap { address, answer });
                 self.token(out);
@@ -218,7 +246,8 @@ impl<A: Application> Master<A> {
     fn scheduled(&mut self, now: Local, out: &mut Outbox) {
         match self.part {
             Part::Spare => self.synch(now, out),
-            Part::Control => self.gap(out),
+            Part::Control => self.message(now, out),
+            Part::Token => self.further_token(now, out),
             _ => {}
         }
     }
@@ -290,14 +319,14 @@ impl<A: Application> Master<A> {
         };
         self.app.inputs(slave, None, out);
         if lost {
-            self.app.joined(slave, false, out);
+            self.left(slave, out);
         }
     }
     fn exchange_done(&mut self, out: &mut Outbox) {
         if self.exchanged {
             out.observe(Observation::ExchangeDone { t_dx: self.exchange_end - self.t0, retries: self.retries });
         }
-        self.acyclic(out);
+        self.acyclic(self.exchange_end, out);
     }
 
     /// Whether something that keeps the bus busy for `span` ends early enough for the next SYNCH.
@@ -305,19 +334,63 @@ impl<A: Application> Master<A> {
         self.active.free_at() + span + self.active.t_id1() <= self.clock.planned()
     }
 
-    fn acyclic(&mut self, out: &mut Outbox) {
+    /// The acyclic part of this cycle: the mode if it is due, then one message (Model: D6).
+    fn acyclic(&mut self, now: Local, out: &mut Outbox) {
         let since = self.clock.coming().saturating_sub(self.control_told);
         let control = self.control_due || since >= self.control_every;
         let rate = self.settings.bus.rate;
         if control && self.fits(rate.octets(GC_OCTETS) + self.settings.bus.span(self.settings.bus.t_id2())) {
             return self.tell_mode(out);
         }
+        self.message(now, out);
+    }
+    /// The one acyclic message: a slave's start-up and the acyclic job in turn; then the GAP.
+    fn message(&mut self, now: Local, out: &mut Outbox) {
         let count = self.handlers.len();
-        let slaves = (0..count).map(|i| (self.startup_next + i) % count);
-        match slaves.into_iter().find(|&slave| !self.handlers[slave].exchanges()) {
-            Some(slave) => self.startup(slave, out),
-            None => self.gap(out),
+        let mut slaves = (0..count).map(|i| (self.startup_next + i) % count);
+        let starting = slaves.find(|&slave| !self.handlers[slave].exchanges());
+        if self.ms1.is_idle()
+            && let Some(job) = self.app.acyclic()
+        {
+            self.ms1.begin(now, job);
         }
+        match starting {
+            Some(slave) if self.ms1.is_idle() || self.clock.coming().is_multiple_of(2) => self.startup(slave, out),
+            _ if !self.ms1.is_idle() => self.acyclic_message(out),
+            _ => self.gap(out),
+        }
+    }
+    fn acyclic_message(&mut self, out: &mut Outbox) {
+        let Some((slave, du)) = self.ms1.next() else { return self.gap(out) };
+        let longest = SAP_FRAME_OCTETS + self.ms1.longest_answer();
+        let Some(retries) = self.retries_that_fit(SAP_FRAME_OCTETS + du.len(), longest) else {
+            return self.gap(out);
+        };
+        let to = self.handlers[slave].params().address;
+        let request = Request { to, service: Service::SrdLow, saps: Some(MS1), retries };
+        self.active.request(self.active.free_at(), &request, du.len(), out, |to| to.copy_from_slice(du));
+        self.part = Part::Acyclic;
+    }
+    fn acyclic_answered(&mut self, now: Local, confirm: Confirm<'_>, out: &mut Outbox) {
+        let answer = match confirm {
+            Confirm::Acknowledged => Ok(None),
+            Confirm::Reply { status: Status::Dl | Status::Dh, du } => Ok(Some(du)),
+            Confirm::Reply { status, .. } => Err(Some(status)),
+            _ => Err(None),
+        };
+        match self.ms1.answered(now, answer) {
+            Progress::Going => {}
+            Progress::Done { slave, pdu } => self.app.acyclic_done(slave, Ok(pdu), out),
+            Progress::Failed { slave, why } => self.app.acyclic_done(slave, Err(why), out),
+        }
+    }
+    /// How often a request of `octets` characters with an answer of up to `reply` may be repeated before the next
+    /// SYNCH; none if it does not fit once.
+    fn retries_that_fit(&self, octets: usize, reply: usize) -> Option<u8> {
+        let once = self.active.longest_cycle(octets, reply);
+        let limit = self.settings.bus.max_retry_limit;
+        let all = (once + self.active.t_id1()) * (i64::from(limit) + 1);
+        self.fits(once).then_some(if self.fits(all) { limit } else { 0 })
     }
     fn tell_mode(&mut self, out: &mut Outbox) {
         let control = if self.mode == MasterMode::Operate { GlobalControl::OPERATE } else { GlobalControl::CLEAR };
@@ -331,18 +404,12 @@ impl<A: Application> Master<A> {
     fn startup(&mut self, slave: usize, out: &mut Outbox) {
         let handler = &self.handlers[slave];
         let (saps, du, reply) = handler.service();
-        let once = self.active.longest_cycle(SAP_FRAME_OCTETS + du.len(), SAP_FRAME_OCTETS + reply);
-        if !self.fits(once) {
+        let Some(retries) = self.retries_that_fit(SAP_FRAME_OCTETS + du.len(), SAP_FRAME_OCTETS + reply) else {
             return self.gap(out);
-        }
-        // Repeats too must end before the next SYNCH.
-        let limit = self.settings.bus.max_retry_limit;
-        let all = (once + self.active.t_id1()) * (i64::from(limit) + 1);
-        let retries = if self.fits(all) { limit } else { 0 };
+        };
         let request = Request { to: handler.params().address, service: Service::SrdHigh, saps: Some(saps), retries };
         self.active.request(self.active.free_at(), &request, du.len(), out, |to| to.copy_from_slice(du));
         self.part = Part::Startup(slave);
-        self.startup_next = slave + 1;
     }
     fn startup_answered(&mut self, slave: usize, confirm: Confirm<'_>, out: &mut Outbox) {
         let answer = match confirm {
@@ -351,10 +418,31 @@ impl<A: Application> Master<A> {
             Confirm::Acknowledged => Answer::Acknowledged,
             _ => Answer::Nothing,
         };
-        if self.handlers[slave].answered(answer, out) {
+        let handler = &mut self.handlers[slave];
+        let before = handler.state();
+        if handler.answered(answer, out) {
             self.app.joined(slave, true, out);
             // The newcomer has not heard the mode yet.
             self.control_due = true;
+        }
+        let gets_on = self.handlers[slave].state() > before;
+        self.startup_next = if gets_on { slave } else { slave + 1 };
+    }
+
+    fn patch(&mut self, slave: Address, telegram: StartupTelegram, patch: &Patch, out: &mut Outbox) {
+        let found = self.handlers.iter().position(|handler| handler.params().address == slave);
+        let Some(slave) = found else { return };
+        let joined = self.handlers[slave].exchanges();
+        self.handlers[slave].patch(telegram, patch, out);
+        if joined {
+            self.left(slave, out);
+        }
+    }
+    /// A slave is not in data exchange any more.
+    fn left(&mut self, slave: usize, out: &mut Outbox) {
+        self.app.joined(slave, false, out);
+        if self.ms1.left(slave) {
+            self.app.acyclic_done(slave, Err(Failure::Left), out);
         }
     }
 
@@ -374,7 +462,23 @@ impl<A: Application> Master<A> {
             acyclic: end - self.exchange_end,
             spare: (self.clock.planned() - end).max(Span::ZERO),
         });
-        self.spare(end, out);
+        self.idle(end, out);
+    }
+    /// The cycle's work ends at `end`: silence, or further tokens (Model: D6).
+    fn idle(&mut self, end: Local, out: &mut Outbox) {
+        if !self.settings.active_spare {
+            return self.spare(end, out);
+        }
+        self.part = Part::Token;
+        out.arm(Timer::Schedule, end);
+    }
+    fn further_token(&mut self, now: Local, out: &mut Outbox) {
+        if self.fits(self.settings.bus.rate.octets(3)) {
+            let end = self.active.pass_token(self.active.free_at(), out);
+            self.idle(end, out);
+        } else {
+            self.spare(now, out);
+        }
     }
 }
 
@@ -404,6 +508,7 @@ impl<A: Application> Station for Master<A> {
             Input::Deadline { timer: Timer::Schedule, .. } => self.scheduled(now, out),
             Input::Command(Order::Mode(mode)) if self.mode >= MasterMode::Clear => self.set_mode(mode, out),
             Input::Deadline { .. } | Input::Sample(_) | Input::Command(Order::Mode(_)) => {}
+            Input::Command(Order::Patch(slave, telegram, patch)) => self.patch(slave, telegram, &patch, out),
             Input::Command(Order::Application(command)) => self.app.command(command, out),
         }
     }

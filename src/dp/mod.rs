@@ -3,6 +3,7 @@
 pub mod handler;
 pub mod iso;
 pub mod master;
+pub mod ms1;
 pub mod slave;
 
 use crate::wire::Sap;

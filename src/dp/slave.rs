@@ -15,6 +15,7 @@
 //! | DATA_EXCH | bad Chk_Cfg | WAIT_PRM, Cfg_Fault | SC |
 //! | DATA_EXCH | Data_Exchange, RD_Inp, RD_Outp | DATA_EXCH | data |
 //! | DATA_EXCH | Data_Exchange of another length | WAIT_PRM | RS |
+//! | DATA_EXCH | MS1 with DPV1_Enable | DATA_EXCH | see [`ms1`](crate::dp::ms1) |
 //! | any but POWER_ON | Slave_Diag, Get_Cfg | unchanged | data |
 //! | any | Set_Prm with neither Lock nor Unlock | unchanged, min T_SDR in force | SC |
 //! | WAIT_CFG, DATA_EXCH | Set_Prm, Chk_Cfg, Data_Exchange of another master | unchanged | RS |
@@ -23,6 +24,7 @@
 
 use core::fmt;
 
+use crate::dp::ms1::{Answer, Records, Server};
 use crate::fdl::passive::{Indication, Passive};
 use crate::fdl::{Filter, Heard, Outbox, Timer};
 use crate::observation::{Observation, SlaveCause, SlaveState};
@@ -32,6 +34,8 @@ use crate::wire::diag::{DiagStatus, Diagnosis};
 use crate::wire::prm::{PrmError, SetPrm};
 use crate::wire::{Address, Header, Sap, Status};
 
+/// Time from an acyclic request to its answer. Model: none of the sources has a number.
+const ACYCLIC_TIME: Span = Span::from_ms(2);
 /// Most output octets of a slave.
 const MAX_OUTPUTS: usize = 244;
 
@@ -67,7 +71,7 @@ impl fmt::Display for Refusal {
 impl core::error::Error for Refusal {}
 
 /// What a device brings along as a DP slave.
-pub trait Application {
+pub trait Application: Records {
     /// Checks the device's own rules for Set_Prm (blocks, times). Keeps nothing yet.
     ///
     /// # Errors
@@ -137,6 +141,9 @@ pub struct Slave {
     watchdog: Option<Span>,
     group: u8,
     fail_safe: bool,
+    /// DPV1_Enable: MS1 is open.
+    dpv1: bool,
+    ms1: Server,
     outputs: [u8; MAX_OUTPUTS],
 }
 
@@ -152,6 +159,8 @@ impl Slave {
             watchdog: None,
             group: 0,
             fail_safe: false,
+            dpv1: false,
+            ms1: Server::new(ACYCLIC_TIME),
             outputs: [0; MAX_OUTPUTS],
         }
     }
@@ -162,6 +171,10 @@ impl Slave {
     /// State now.
     pub const fn state(&self) -> SlaveState {
         self.state
+    }
+    /// Whether the last parameters or configuration were refused.
+    pub fn has_fault(&self) -> bool {
+        self.fault != DiagStatus::default()
     }
     /// Which telegrams it wants.
     pub fn filter(&self, app: &impl Application) -> Filter {
@@ -219,7 +232,19 @@ impl Slave {
                 let outputs = &self.outputs[..self.identity.outputs.into()];
                 self.passive.reply(now, Status::Dl, outputs.len(), out, |du| du.copy_from_slice(outputs));
             }
+            (Some(Sap::MS1), Some(Sap::MASTER_MS1)) => self.ms1(request, app, out),
             _ => self.refuse(now, out),
+        }
+    }
+    fn ms1(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
+        let &Arrived { now, header, du, .. } = request;
+        if self.state != SlaveState::DataExch || !self.dpv1 || self.is_foreign(header.sa) {
+            return self.refuse(now, out);
+        }
+        match self.ms1.heard(now, du, app) {
+            Answer::Acknowledge => self.passive.acknowledge(now, out),
+            Answer::Data(pdu) => self.passive.reply(now, Status::Dl, pdu.len(), out, |du| du.copy_from_slice(pdu)),
+            Answer::Refuse(status) => self.passive.reply(now, status, 0, out, |_| ()),
         }
     }
     fn refuse(&mut self, now: Local, out: &mut Outbox) {
@@ -309,6 +334,7 @@ impl Slave {
         self.fault = DiagStatus::default();
         self.group = prm.group;
         self.fail_safe = prm.dpv1.fail_safe();
+        self.dpv1 = prm.dpv1.dpv1_enable();
         self.passive.set_min_tsdr(Tbit(prm.min_tsdr.into()));
         let step = Span::from_ms(prm.watchdog_base_ms().into());
         self.watchdog = prm.watchdog_units().map(|units| step * units.into());
@@ -364,6 +390,7 @@ impl Slave {
         out.observe(Observation::SlaveState { from, to: state, cause });
         if from == SlaveState::DataExch && state != SlaveState::DataExch {
             self.outputs = [0; MAX_OUTPUTS];
+            self.ms1.reset();
             app.leave(now, out);
         }
         if state == SlaveState::DataExch {

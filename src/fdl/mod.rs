@@ -44,7 +44,7 @@ pub enum Input<'a, C> {
         /// Whether this station's receiver sees characters on the line at this instant.
         busy: bool,
     },
-    /// The instant of [`Outbox::sample_at`] came; the shaft was at this raw position [steps].
+    /// The instant of [`Outbox::sample_at`] came; the shaft was at this raw position (steps).
     Sample(u32),
     /// The scenario orders something.
     Command(C),
@@ -69,7 +69,7 @@ impl<'a, C> Input<'a, C> {
 pub struct Heard<'a> {
     /// The characters, start delimiter to end delimiter.
     pub octets: &'a [u8],
-    /// Raw position of the shaft [steps] at this instant, if the station has asked for it
+    /// Raw position of the shaft (steps) at this instant, if the station has asked for it
     /// ([`Outbox::sample_with_telegrams`]); zero otherwise.
     pub sample: u32,
 }
@@ -146,11 +146,13 @@ pub enum Timer {
     Window,
     /// T_O.
     SetPoint,
+    /// The LEDs may change because nothing was heard.
+    Leds,
 }
 
 impl Timer {
     /// Every timer, in the order of their numbers.
-    pub const ALL: [Self; 5] = [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint];
+    pub const ALL: [Self; 6] = [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint, Self::Leds];
 }
 
 /// A station's answer to one input. Reused from step to step, so that no step allocates.

@@ -133,7 +133,7 @@ impl BusParams {
 mod tests {
     use super::*;
 
-    /// Derived columns of the profile table: rate, T_SM, T_ID1, T_ID2, T_TO of address 2 [t_bit].
+    /// Derived columns of the profile table: rate, T_SM, T_ID1, T_ID2, T_TO of address 2 (t_bit).
     #[test]
     fn profile_values_and_derived_times() {
         for (rate, t_sm, t_id1, t_id2, t_to) in [

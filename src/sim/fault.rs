@@ -42,7 +42,7 @@ pub struct Bursts {
     pub from_cycle: u64,
     /// Cycles in a row.
     pub count: u64,
-    /// Distance from burst to burst [cycles]; none for a single burst.
+    /// Distance from burst to burst (cycles); none for a single burst.
     pub every: Option<u64>,
 }
 

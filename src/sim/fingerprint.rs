@@ -183,7 +183,7 @@ mod tests {
         send(&mut two, 4, &[5]);
         assert_eq!(one.stations().next(), two.stations().next());
         assert_ne!(one.total().wire, two.total().wire);
-        assert_eq!(one.total().latches == two.total().latches, false, "a station that is there counts");
+        assert_ne!(one.total().latches, two.total().latches, "a station that is there counts");
     }
 
     #[test]

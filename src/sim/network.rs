@@ -236,10 +236,12 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         match act {
             Act::PowerOn if !self.slots[slot].powered => {
                 self.slots[slot].powered = true;
+                self.tell(slot, &Observation::Power { on: true }, recorder);
                 self.step(slot, self.local(slot), Input::PowerOn, recorder);
             }
             Act::PowerOn => {}
             Act::PowerOff => {
+                self.tell(slot, &Observation::Power { on: false }, recorder);
                 let slot = &mut self.slots[slot];
                 slot.powered = false;
                 for deadline in &mut slot.deadlines {
@@ -248,6 +250,11 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
             Act::Command(command) => self.step(slot, self.local(slot), Input::Command(command), recorder),
         }
+    }
+    /// Tells what happened to a station and was not its own doing.
+    fn tell<R: Recorder>(&self, slot: usize, what: &Observation, recorder: &mut R) {
+        let Slot { address, site, .. } = &self.slots[slot];
+        recorder.observe(Stamp { at: self.now, station: *address, crystal: &site.crystal }, what);
     }
     fn local(&self, slot: usize) -> Local {
         self.slots[slot].site.crystal.to_local(self.now)
@@ -268,7 +275,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             self.bus.heard(id);
         }
     }
-    /// The shaft's raw position now [steps]; zero without a shaft.
+    /// The shaft's raw position now (steps); zero without a shaft.
     fn raw(&self, slot: usize) -> u32 {
         self.slots[slot].site.shaft.as_ref().map_or(0, |(shaft, resolution)| resolution.raw(shaft.angle(self.now)))
     }
@@ -376,16 +383,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             self.push(end, Phase::Edge, slot, Event::Sent);
         }
         if lost {
-            let stamp = Stamp { at: self.now, station: address, crystal: &self.slots[slot].site.crystal };
             let how = observation::Disturbance::Lost;
-            return recorder.observe(stamp, &Observation::Disturbed { how });
+            return self.tell(slot, &Observation::Disturbed { how }, recorder);
         }
         let Some((_, frame)) = self.out.sending() else { return };
         recorder.telegram(&Transmission { start, end, sender: address, octets: frame.octets() });
         let (id, hit) = self.bus.send(slot, self.slots[slot].site.place, (start, end), frame);
         if let Some(with) = hit {
-            let stamp = Stamp { at: self.now, station: address, crystal: &self.slots[slot].site.crystal };
-            recorder.observe(stamp, &Observation::Collision { with: self.slots[with].address });
+            self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
         }
         self.deliver(slot, id);
     }

@@ -31,7 +31,8 @@ pub struct Stamp<'a> {
 
 /// Reads a run while it happens.
 pub trait Recorder {
-    /// A telegram was put on the line. Comes when it starts.
+    /// A telegram will be on the line. Comes when its sender decides so, at or before its first bit; telegrams that do
+    /// not overlap come in the order of their starts.
     fn telegram(&mut self, telegram: &Transmission<'_>);
     /// A station observed something.
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation);

@@ -1,9 +1,10 @@
 //! Build: from a scenario to a network that is ready to run, with the telegrams of a configuration tool.
 
-use crate::device::controller::{self, Controller};
+use crate::device::controller::{self, Controller, LifeSettings};
 use crate::device::drive::{Drive, Subscriber};
 use crate::device::encoder::{Disc, Encoder};
 use crate::device::node::{Command, Node};
+use crate::device::options::Resolution;
 use crate::device::unit::UnitSettings;
 use crate::dp::handler::SlaveParams;
 use crate::dp::iso::Rearm;
@@ -11,7 +12,7 @@ use crate::dp::master::{Master, Settings};
 use crate::observation::MasterMode;
 use crate::sim::bus::Place;
 use crate::sim::crystal::Crystal;
-use crate::sim::motion::{Resolution, Shaft};
+use crate::sim::motion::{self, Shaft};
 use crate::sim::network::{self, Act, Network, NetworkEvent, Site};
 use crate::sim::noise::{JitterSource, Purpose, Stream};
 use crate::sim::queue::Queue;
@@ -20,6 +21,7 @@ use crate::study::scenario::{self, Action, CodeSequence, Scenario, Slave, When};
 use crate::time::{Local, Span, Time};
 use crate::wire::Address;
 use crate::wire::drive::G1Stw;
+use crate::wire::parameter::ParameterAddress;
 use crate::wire::prm::{DpV1Status, DxbLink, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81};
 
 /// Group 8, the clock's (Set_Prm octet 7).
@@ -61,15 +63,18 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
 }
 
 fn user_block(slave: &Slave) -> UserPrm81 {
-    let device = slave.device;
+    let Resolution { steps_per_rev, revolutions } = slave.resolution();
+    let positions = u64::from(steps_per_rev) * u64::from(revolutions);
     let scaling = slave.scaling;
     UserPrm81 {
         options: EncoderOptions::default()
             .with(EncoderOptions::COUNTER_CLOCKWISE, slave.code_sequence == CodeSequence::Ccw)
             .with(EncoderOptions::ACTIVATE, slave.functions)
-            .with(EncoderOptions::SCALING, scaling.is_some()),
-        units_per_revolution: scaling.map_or(device.steps_per_rev, |scaling| scaling.units_per_rev),
-        total_range: scaling.map_or(device.steps_per_rev * device.revolutions, |scaling| scaling.total_range),
+            // Bit 3 is the default of the GSD; without bit 1 it does nothing (manual 3.2.2).
+            .with(EncoderOptions::SCALING, scaling.is_some() || !slave.functions),
+        units_per_revolution: scaling.map_or(steps_per_rev, |scaling| scaling.units_per_rev),
+        // Not in force without scaling.
+        total_range: scaling.map_or(positions.min(u32::MAX.into()) as u32, |scaling| scaling.total_range),
         max_failures: slave.max_life_failures,
         reserved: [0; 7],
     }
@@ -78,7 +83,7 @@ fn user_block(slave: &Slave) -> UserPrm81 {
 fn iso_block(scenario: &Scenario, slave: &Slave) -> IsoM {
     let device = slave.device;
     let units = |span: Span| (span.ticks() / Span::TICKS_PER_ISO_UNIT) as u32;
-    let t_dx = Plan::of(scenario).t_dx.ceil_to(Span::from_iso_units(1));
+    let t_dx = Plan::of(scenario).t_dx_told();
     IsoM {
         version: 1,
         t_base_dp: device.t_base_dp,
@@ -161,34 +166,35 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         dx_retries: master.dx_retries,
         lost_after: master.lost_after.min(u16::MAX.into()) as u16,
         clear_for: master.clear_for,
+        active_spare: master.active_spare,
         data_control_time: master.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
+    let life = LifeSettings { t_mapc: master.t_mapc, start: master.life_start, delay: master.life_delay };
     let addresses = slaves.iter().map(|slave| slave.address);
-    Master::new(settings, Controller::new(addresses, master.t_mapc, master.life_start))
+    Master::new(settings, Controller::new(addresses, life))
 }
 
 fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let settings = UnitSettings {
-        address: slave.address,
-        rate: scenario.bus.params.rate,
-        t_sdr: slave.t_sdr,
-        clock_tolerance: slave.clock_tolerance,
+        options: slave.options,
+        ..UnitSettings::new(slave.address, scenario.bus.params.rate, slave.t_sdr)
     };
     let machine = if slave.silent {
         Node::Silent(slave.address)
     } else if slave.device.subscriber {
         Node::Drive(Drive::new(slave.device, settings, Subscriber::default()))
     } else {
-        Node::Encoder(Encoder::new(slave.device, settings, Disc::new(slave.device)))
+        Node::Encoder(Encoder::new(slave.device, settings, Disc::new(slave.device, &slave.options)))
     };
-    let resolution = Resolution::new(slave.device.steps_per_rev, slave.device.revolutions);
+    let Resolution { steps_per_rev, revolutions } = slave.resolution();
+    let resolution = motion::Resolution::new(steps_per_rev, revolutions);
     let shaft = Shaft::new(&slave.motion).expect("a checked motion");
     Site {
         machine,
         place: Place::at(slave.position_mm),
         crystal: crystal(scenario.run.seed, slave.address, slave.crystal),
-        shaft: Some((shaft, resolution.expect("a profile's disc"))),
+        shaft: Some((shaft, resolution.expect("a checked resolution"))),
         powered_at: Time::ZERO + slave.powered_at,
     }
 }
@@ -216,6 +222,18 @@ fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Ac
     match action {
         Action::PowerOff => to_slaves(Act::PowerOff),
         Action::PowerOn => to_slaves(Act::PowerOn),
+        Action::ReadParameter { parameter, subindex, elements } => for_slaves(&|slave| {
+            let address = ParameterAddress { attribute: ParameterAddress::VALUE, elements, pnu: parameter, subindex };
+            controller::Command::ReadParameter(slave, address)
+        }),
+        Action::ChangeParameter { parameter, subindex, format, value } => for_slaves(&|slave| {
+            let address =
+                ParameterAddress { attribute: ParameterAddress::VALUE, elements: 1, pnu: parameter, subindex };
+            controller::Command::ChangeParameter(slave, address, format, value)
+        }),
+        Action::Startup { telegram, patch } => {
+            slaves.iter().map(|&slave| (master, Act::Command(Command::Patch(slave, telegram, patch)))).collect()
+        }
         Action::Clear => vec![(master, Act::Command(Command::Mode(MasterMode::Clear)))],
         Action::Operate => vec![(master, Act::Command(Command::Mode(MasterMode::Operate)))],
         Action::Acknowledge => for_slaves(&controller::Command::Acknowledge),
@@ -229,87 +247,55 @@ fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Ac
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::profile;
-    use crate::fdl::params::BusParams;
-    use crate::observation::Observation;
-    use crate::sim::motion::Motion;
-    use crate::sim::network::Until;
-    use crate::sim::noise::GcJitter;
-    use crate::sim::queue::{HeapQueue, NearQueue};
-    use crate::sim::record::{Recorder, Stamp, Transmission};
-    use crate::study::scenario::*;
-    use crate::time::{BitRate, Tbit};
 
-    fn small() -> Scenario {
-        let slave = |n: u8, device: &str| Slave {
-            address: Address::new(n).unwrap(),
-            device: profile::find(device).unwrap(),
-            position_mm: u64::from(n) * 10_000,
-            crystal: scenario::Crystal::Within(50_000),
-            t_sdr: Tbit(30),
-            times: IsoTimes {
-                t_i: Span::from_us(125),
-                t_o: Span::from_us(1250),
-                t_pll_w: Span::from_us(1),
-                t_pll_d: Span::ZERO,
-            },
-            motion: Motion::Speed { start: crate::sim::motion::Angle::ZERO, micro_rpm: 1_500_000_000 },
-            max_life_failures: 1,
-            clock_tolerance: 1,
-            code_sequence: CodeSequence::Cw,
-            functions: false,
-            scaling: None,
-            silent: false,
-            powered_at: Span::ZERO,
-        };
-        let mut slaves: Vec<Slave> = (3..=10).map(|n| slave(n, "posital-ocd-dpb1b")).collect();
-        slaves.push(slave(11, "subscriber-drive"));
-        Scenario {
-            name: "small".into(),
-            question: String::new(),
-            run: Run { seed: 1, duration: Extent::Cycles(200) },
-            bus: Bus { params: BusParams::profile(BitRate::M12), cable_mm: 100_000 },
-            master: scenario::Master {
-                address: Address::new(2).unwrap(),
-                position_mm: 0,
-                crystal: scenario::Crystal::Offset(0),
-                t_dp: Span::from_ms(2),
-                t_mapc: 1,
-                watchdog: Watchdog::of(Span::from_ms(200)),
-                get_cfg: true,
-                dx_retries: 1,
-                lost_after: 10,
-                clear_for: 0,
-                gc_jitter: GcJitter::BoundedNormal { sigma: Span::from_ns(100), bound: Span::from_ns(400) },
-                accumulate: false,
-                life_start: 1,
-            },
-            slaves,
-            links: vec![Link {
-                publisher: Address::new(3).unwrap(),
-                subscriber: Address::new(11).unwrap(),
-                offset: 4,
-                length: 4,
-            }],
-            events: vec![],
-            disturbances: vec![],
-            record: Record { files: false, plots: false, tables: vec![], rows: 1 },
-        }
+    /// Three encoders at 12 Mbit/s, T_DP 2 ms, T_I 125 us, T_O 375 us, watchdog 200 ms.
+    const THREE: &str = r#"
+        [run]
+        cycles = 1
+        [bus]
+        rate = "12 Mbit/s"
+        [master]
+        address = 2
+        t_dp = "2 ms"
+        t_i = "125 us"
+        t_o = "375 us"
+        watchdog = "200 ms"
+        [[slave]]
+        addresses = "6..8"
+        device = "simodrive-sensor-isochron"
+    "#;
+    const LINK: &str = r#"
+        [[slave]]
+        address = 9
+        device = "subscriber-drive"
+        [[link]]
+        publisher = 6
+        subscriber = 9
+    "#;
+
+    fn octets(text: &str) -> Vec<u8> {
+        text.split_whitespace().map(|octet| u8::from_str_radix(octet, 16).expect("an octet")).collect()
     }
 
-    struct Print;
-    impl Recorder for Print {
-        fn telegram(&mut self, t: &Transmission<'_>) {
-            println!("{:>14.3} us  {:>4} -> {:02X?}", t.start.since_zero().as_us(), t.sender, t.octets);
-        }
-        fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
-            println!("{:>14.3} us  {:>4}: {what}", stamp.at.since_zero().as_us(), stamp.station);
-        }
-    }
+    /// The worked telegram: T_DX is 2674 units of 1/12 us, the user block is the GSD's default.
     #[test]
-    fn smoke() {
-        let mut network: Network<Node, NearQueue<NetworkEvent>> = network(&small());
-        network.run(Until::Cycle(200), 1_000_000, &mut Print);
-        let _ = HeapQueue::<NetworkEvent>::default();
+    fn set_prm_is_the_telegram_of_a_configuration_tool() {
+        let three = Scenario::parse("three", "three.toml", THREE, &[]).expect("a good scenario");
+        let expected = octets(
+            "88 14 01 0B 80 F9 80 C0 00 18 \
+             15 81 00 00 08 00 00 20 00 02 00 00 00 01 00 00 00 00 00 00 00 \
+             1C 04 00 00 01 00 00 05 DC 00 10 01 00 00 05 DC 00 01 00 03 00 00 0A 72 00 0C 00 00",
+        );
+        assert_eq!(set_prm(&three, &three.slaves[0]), expected);
+    }
+
+    #[test]
+    fn a_publisher_waits_for_an_idle_line_and_a_subscriber_gets_its_links() {
+        let text = [THREE, LINK].concat().replace("375 us", "500 us");
+        let four = Scenario::parse("four", "four.toml", &text, &[]).expect("a good scenario");
+        let publisher = set_prm(&four, &four.slaves[0]);
+        assert_eq!((publisher[3], publisher[7]), (76, 0xE0), "min T_SDR is T_ID1, Publisher_Enable is set");
+        let subscriber = set_prm(&four, &four.slaves[3]);
+        assert_eq!(subscriber[10 + IsoM::LEN..], octets("09 03 00 00 01 06 0C 04 04"));
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::layout::Layout;
-use crate::observation::{ClockVerdict, Observation, Phase, PllState, SlaveState};
+use crate::observation::{ClockVerdict, Leds, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -52,6 +52,8 @@ pub struct SlaveCounts {
     pub phase: Phase,
     /// State of the clock recovery at the end.
     pub pll: PllState,
+    /// What the LEDs show at the end.
+    pub leds: Leds,
     /// How often each fault was latched, by its code in `G1_XIST2`.
     pub faults: BTreeMap<u16, u64>,
     /// Faults that were acknowledged.
@@ -140,6 +142,7 @@ impl SlaveCounts {
             state: SlaveState::PowerOn,
             phase: Phase::Configuration,
             pll: PllState::Idle,
+            leds: Leds::NoSupply,
             faults: BTreeMap::new(),
             acknowledgements: 0,
             clock_failures: 0,
@@ -157,9 +160,11 @@ impl SlaveCounts {
     pub(super) fn observe(&mut self, at: Time, cycles: u64, what: &Observation) {
         match *what {
             Observation::SlaveState { to, .. } => self.state = to,
-            Observation::Phase { from, to } => {
-                self.phases[from as usize] += at - self.since;
-                (self.phase, self.since) = (to, at);
+            Observation::Phase { to, .. } => self.phase(at, to),
+            Observation::Leds { to, .. } => self.leds = to,
+            Observation::Power { on: false } => {
+                self.phase(at, Phase::Configuration);
+                (self.state, self.pll, self.leds) = (SlaveState::PowerOn, PllState::Idle, Leds::NoSupply);
             }
             Observation::Clock { verdict: ClockVerdict::First, .. } => {
                 self.first.get_or_insert((at, cycles));
@@ -172,6 +177,12 @@ impl SlaveCounts {
             Observation::Acknowledged { .. } => self.acknowledgements += 1,
             _ => {}
         }
+    }
+
+    /// What a slave without supply left is seen only when it is back: the time counts for the phase it was taken for.
+    fn phase(&mut self, at: Time, to: Phase) {
+        self.phases[self.phase as usize] += at - self.since;
+        (self.phase, self.since) = (to, at);
     }
 
     fn pll(&mut self, at: Time, cycles: u64, to: PllState) {

@@ -158,8 +158,9 @@ impl Histogram {
     pub fn bins(&self, bins: usize) -> Vec<Bin> {
         let recorded = self.recorded();
         let (Some(first), Some(last)) = (recorded.first(), recorded.last()) else { return Vec::new() };
-        let (low, high) = (first.0, last.0);
-        let resolution = self.positive.equivalent_range(low.unsigned_abs().max(high.unsigned_abs())) as i64;
+        let resolution = self.positive.equivalent_range(first.0.unsigned_abs().max(last.0.unsigned_abs())) as i64;
+        // A recorded value stands in the middle of what the histogram cannot tell apart.
+        let (low, high) = (first.0 - resolution / 2, last.0 + resolution / 2);
         let width = ((high - low) / bins.max(1) as i64 + 1).max(resolution);
         let count = ((high - low) / width + 1) as usize;
         let mut bins: Vec<_> = (0..count as i64)
@@ -569,6 +570,7 @@ mod tests {
             state: _,
             phase: _,
             pll: _,
+            leds: _,
             pll_error,
             period: _,
             window: _,

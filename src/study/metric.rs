@@ -12,7 +12,7 @@
 use super::count::Counts;
 use super::layout::Layout;
 use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
-use crate::observation::{ClockVerdict, Observation, Phase, PllState, SlaveState};
+use crate::observation::{ClockVerdict, Leds, Observation, Phase, PllState, SlaveState};
 use crate::sim::crystal::Crystal;
 use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::time::{Local, Span, Time};
@@ -42,7 +42,12 @@ pub struct Metrics<S, V> {
     grid: Vec<Grid>,
     slaves: Vec<Watch>,
     links: Vec<LinkWatch>,
+    /// Events of the instant that is going on: a cycle that begins at this instant is theirs.
+    held: Vec<EventRow>,
 }
+
+/// Events of one instant that fit without growing: a few of every station.
+const HELD: usize = 512;
 
 /// The nominal latch instant of all slaves with one T_I.
 #[derive(Debug)]
@@ -97,7 +102,8 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
             received: false,
         };
         let links = layout.links().iter().map(link).collect();
-        Self { counts: Counts::new(&layout), open: None, grid, slaves, links, layout, shafts, sink }
+        let held = Vec::with_capacity(HELD);
+        Self { counts: Counts::new(&layout), open: None, grid, slaves, links, held, layout, shafts, sink }
     }
 
     /// What was counted until now.
@@ -108,8 +114,13 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
     pub fn sink(&self) -> &S {
         &self.sink
     }
-    /// The run is over at `end`: the rows of the cycle under way leave as far as they came.
+    /// The run is over at `end`: the rows of the cycle under way leave as far as they came. A cycle that only begins
+    /// at the end belongs to the run no more.
     pub fn finish(mut self, end: Time) -> (Counts, S) {
+        self.release();
+        if self.open.take_if(|open| open.t0 >= end).is_some() {
+            self.counts.network.cycles -= 1;
+        }
         self.flush();
         self.counts.finish(end);
         (self.counts, self.sink)
@@ -136,6 +147,15 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
             acyclic: None,
             spare: None,
         });
+    }
+
+    /// Sends the held events off: their instant is over.
+    fn release(&mut self) {
+        let cycle = self.open.map_or(0, |open| open.cycle);
+        for mut event in self.held.drain(..) {
+            event.cycle = cycle;
+            self.sink.event(&event);
+        }
     }
 
     /// Sends the rows of the cycle under way off and makes everything ready for the next.
@@ -232,6 +252,9 @@ impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
     }
 
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+        if self.held.first().is_some_and(|event| event.at < stamp.at) {
+            self.release();
+        }
         self.counts.station(what);
         if stamp.station == self.layout.master {
             self.master(&stamp, what);
@@ -239,8 +262,7 @@ impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
             self.slave(index, &stamp, what);
         }
         if what.is_event() {
-            let cycle = self.open.map_or(0, |open| open.cycle);
-            self.sink.event(&EventRow { at: stamp.at, cycle, station: stamp.station, what: *what });
+            self.held.push(EventRow { at: stamp.at, cycle: 0, station: stamp.station, what: *what });
         }
     }
 }
@@ -268,6 +290,7 @@ impl Watch {
             state: SlaveState::PowerOn,
             phase: Phase::Configuration,
             pll: PllState::Idle,
+            leds: Leds::NoSupply,
             pll_error: None,
             period: None,
             window: None,
@@ -288,17 +311,37 @@ impl Watch {
         (self.travelling, self.latched, self.reply) = (self.latched, None, None);
     }
 
+    /// The supply is gone, and with it everything that the slave knew; what it latched last stays to be seen.
+    fn switched_off(&mut self) {
+        let row = &mut self.row;
+        (row.state, row.phase, row.pll, row.leds) =
+            (SlaveState::PowerOn, Phase::Configuration, PllState::Idle, Leds::NoSupply);
+        (row.period, row.window, row.mls, row.sls) = (None, None, 0, 0);
+        (row.life_counter, row.clock_counter) = (0, 0);
+    }
+
     fn observe(&mut self, what: &Observation) {
         let row = &mut self.row;
         match *what {
             Observation::SlaveState { to, .. } => row.state = to,
-            Observation::Phase { to, .. } => row.phase = to,
+            Observation::Phase { to, .. } => {
+                row.phase = to;
+                // Nothing is compared at T_O without a clock, and the own sign of life stands at 0.
+                if to < Phase::MasterLife {
+                    (row.mls, row.sls) = (0, 0);
+                }
+                if to == Phase::Configuration {
+                    (row.life_counter, row.clock_counter) = (0, 0);
+                }
+            }
             Observation::Pll { to, .. } => {
                 row.pll = to;
                 if matches!(to, PllState::Idle | PllState::Waiting) {
                     (row.period, row.window) = (None, None);
                 }
             }
+            Observation::Leds { to, .. } => row.leds = to,
+            Observation::Power { on: false } => self.switched_off(),
             Observation::Clock { verdict: ClockVerdict::Stray, .. } => {}
             Observation::Clock { verdict, error, period, window, counter } => {
                 if matches!(verdict, ClockVerdict::Hit | ClockVerdict::Outside) {
@@ -417,6 +460,15 @@ mod tests {
     }
 
     #[test]
+    fn a_cycle_that_begins_at_the_end_is_none() {
+        let mut told = Told::new(0);
+        told.cycle(0, 0);
+        told.cycle(1_000_000, 1);
+        let (counts, kept) = told.over(1_000_000);
+        assert_eq!((counts.network.cycles, kept.cycles.len(), kept.slaves.len()), (1, 1, 2));
+    }
+
+    #[test]
     fn latches_are_measured_from_the_nominal_grid() {
         let mut told = Told::new(0);
         told.cycle(500, 0); // late: the grid does not move
@@ -450,6 +502,58 @@ mod tests {
         assert_eq!(kept.slaves[0].latch_offset, Some(Span::from_ns(875_000) - Span::from_ticks(10_498_951)));
         // Nominal t0(1) is at 999 900.01 ns: 11 998 800.12 ticks, 11 998 801.
         assert_eq!(kept.cycles[1].gc_jitter, Span::from_ticks(-1));
+    }
+
+    #[test]
+    fn signs_of_life_end_with_the_clock_and_counters_with_data_exchange() {
+        let phase = |from, to| Observation::Phase { from, to };
+        let mut told = Told::new(0);
+        told.cycle(0, 0);
+        told.tell(500_000, 3, Observation::SetPoint { mls: 6, sls: 9, counter: 10, expected: false });
+        told.cycle(1_000_000, 1);
+        told.tell(1_000_020, 3, phase(Phase::Operation, Phase::Clock));
+        told.cycle(2_000_000, 2);
+        told.tell(2_100_000, 3, phase(Phase::Clock, Phase::Configuration));
+        let (_, kept) = told.over(3_000_000);
+        let rows = kept.slaves.iter().filter(|row| row.slave == address(3));
+        let values: Vec<_> = rows.map(|row| (row.mls, row.sls, row.life_counter)).collect();
+        assert_eq!(values, [(6, 9, 10), (0, 0, 10), (0, 0, 0)]);
+    }
+
+    #[test]
+    fn the_leds_are_carried_over_and_a_slave_without_supply_is_dark_and_knows_nothing() {
+        let leds = |from, to| Observation::Leds { from, to };
+        let mut told = Told::new(0);
+        told.cycle(0, 0);
+        told.tell(100, 3, leds(Leds::NoSupply, Leds::NotConfigured));
+        told.tell(200, 3, leds(Leds::NotConfigured, Leds::DataExchange));
+        told.tell(
+            300,
+            3,
+            Observation::SlaveState {
+                from: SlaveState::WaitCfg,
+                to: SlaveState::DataExch,
+                cause: SlaveCause::Configured,
+            },
+        );
+        told.tell(400, 3, Observation::Phase { from: Phase::Configuration, to: Phase::Operation });
+        told.tell(500, 3, Observation::Pll { from: PllState::Idle, to: PllState::Locked });
+        told.cycle(1_000_000, 1);
+        told.cycle(2_000_000, 2);
+        told.tell(2_100_000, 3, Observation::Power { on: false });
+        told.cycle(3_000_000, 3);
+        // Only now does the slave see where it has been.
+        told.tell(3_100_000, 3, Observation::Phase { from: Phase::Operation, to: Phase::Configuration });
+        let (counts, kept) = told.over(4_000_000);
+        let rows = kept.slaves.iter().filter(|row| row.slave == address(3));
+        let values: Vec<_> = rows.map(|row| (row.leds, row.state, row.phase, row.pll)).collect();
+        let on = (Leds::DataExchange, SlaveState::DataExch, Phase::Operation, PllState::Locked);
+        let off = (Leds::NoSupply, SlaveState::PowerOn, Phase::Configuration, PllState::Idle);
+        assert_eq!(values, [on, on, off, off]);
+        let slave = &counts.slaves[0];
+        assert_eq!((slave.leds, slave.state, slave.phase, slave.pll), off);
+        let [configuration, .., operation] = slave.phases;
+        assert_eq!((configuration, operation), (Span::from_ns(1_900_400), Span::from_ns(2_099_600)));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 pub mod build;
 pub mod count;
+pub mod devices;
 pub mod export;
 pub mod histogram;
 pub mod layout;

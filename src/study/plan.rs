@@ -22,6 +22,8 @@ pub const TOKEN: Tbit = Tbit::of_octets(3);
 const STATUS_REQUEST: Tbit = Tbit::of_octets(6);
 /// Octets that a Data_Exchange telegram has around its data unit.
 const OVERHEAD: usize = 9;
+/// Octets that a telegram with SAPs has around its data unit.
+const SAP_OVERHEAD: usize = 11;
 
 /// One Data_Exchange in the cycle, seen at the master's plug, relative to t0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -75,9 +77,23 @@ impl Plan {
             synch: t_id1 + bus.span(SYNCH),
         }
     }
+    /// T_DX as Set_Prm says it and slaves check it: in whole units of 1/12 us, rounded up.
+    pub fn t_dx_told(&self) -> Span {
+        self.t_dx.ceil_to(Span::from_iso_units(1))
+    }
     /// What every T_DP must hold: the Data_Exchange, one GAP poll, one token, SYNCH (manual 3.3.2).
     pub fn content(&self) -> Span {
         self.t_dx + self.gap + self.token + self.synch
+    }
+    /// What T_DP must hold while `slave` starts up and all others exchange data: its Set_Prm of `octets`, which is its
+    /// longest service, one token, SYNCH. Model: D6, the service must end before SYNCH.
+    pub fn start_up(&self, scenario: &Scenario, slave: &Slave, octets: usize) -> Span {
+        let bus = &scenario.bus.params;
+        let own = self.slots.iter().find(|slot| slot.slave == slave.address);
+        let own = own.map_or(Span::ZERO, |slot| slot.reply_end - slot.request);
+        let set_prm = bus.rate.octets(SAP_OVERHEAD + octets);
+        let answer = (bus.span(bus.max_tsdr) + bus.rate.octets(SAP_OVERHEAD)).max(bus.span(bus.t_sl));
+        self.t_dx - own + set_prm + answer + self.token + self.synch
     }
     /// The shortest T_DP on the grid of `device` that holds the cycle and that the device allows (manual 3.3.2).
     pub fn t_dp_min(&self, device: &Profile) -> Span {
@@ -85,7 +101,7 @@ impl Plan {
     }
     /// Smallest T_O of `device` (manual 3.3.6, Model: D3).
     pub fn t_o_min(&self, device: &Profile) -> Span {
-        smallest_t_o(self.t_dx, device.t_o_min, device.io_grid())
+        smallest_t_o(self.t_dx_told(), device.t_o_min, device.io_grid())
     }
     /// Largest T_O of `slave` with its T_I in a cycle of `t_dp` (manual 3.3.5, Model: D3). Less than
     /// [`Self::t_o_min`] if there is none.
@@ -135,7 +151,7 @@ mod tests {
 
     const GRID: Span = Span::from_us(125);
 
-    /// T_DX [us] of n encoders by rate, longest T_SDR as in the profile and as in a fast ASIC's GSD.
+    /// T_DX (us) of n encoders by rate, longest T_SDR as in the profile and as in a fast ASIC's GSD.
     #[test]
     fn worked_values_of_t_dx() {
         let table = [
@@ -183,6 +199,17 @@ mod tests {
     fn t_o_exceeds_its_bound_strictly() {
         assert_eq!(smallest_t_o(Span::from_us(250), GRID, GRID), Span::from_us(500));
         assert_eq!(smallest_t_o(Span::from_us(250) - Span::from_ticks(1), GRID, GRID), Span::from_us(375));
+    }
+
+    /// A T_DX within the last 1/12 us before a point of the grid counts as that point, as the slave will see it.
+    #[test]
+    fn t_o_exceeds_the_t_dx_that_slaves_are_told() {
+        let device = find("posital-ocd-dpb1b").unwrap();
+        let mut plan = Plan::of(&network(BitRate::M12, device, 1));
+        plan.t_dx = Span::from_us(1_500) - Span::from_ticks(1);
+        assert_eq!((plan.t_dx_told(), plan.t_o_min(device)), (Span::from_us(1_500), Span::from_us(1_750)));
+        plan.t_dx = Span::from_us(1_500) - Span::from_iso_units(1);
+        assert_eq!((plan.t_dx_told(), plan.t_o_min(device)), (plan.t_dx, Span::from_us(1_625)));
     }
 
     #[test]

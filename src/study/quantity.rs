@@ -74,6 +74,7 @@ const ANGLE: Kind = Kind {
     unit_of_step: "",
     units: &[("rev", (Angle::UNITS_PER_REV as i128, 1)), ("deg", (Angle::UNITS_PER_REV as i128, 360))],
 };
+const GAIN: Kind = Kind { noun: "a gain", example: "1/4", step: "1/65536", unit_of_step: "", units: &[] };
 const RATE: Kind = Kind {
     noun: "a bit rate",
     example: "12 Mbit/s",
@@ -214,6 +215,27 @@ pub fn angle(text: &str) -> Result<Angle, QuantityError> {
         .ok_or_else(|| range(text, &ANGLE, "-2147483648 rev", "2147483647 rev"))
 }
 
+/// Reads a gain (1/65536), `"1/4"` or `"0.25"`, rounded to the nearest step, halves up.
+///
+/// # Errors
+/// No gain, or one that is negative or above 1.
+pub fn gain(text: &str) -> Result<u32, QuantityError> {
+    /// A gain of one.
+    const ONE: i128 = 1 << 16;
+    let (above, below) = text.split_once('/').unwrap_or((text, "1"));
+    let none = || QuantityError::NoNumber { text: text.into(), noun: GAIN.noun, example: GAIN.example };
+    let above = Decimal::parse(above.trim()).ok_or_else(none)?;
+    let below = Decimal::parse(below.trim()).filter(|below| below.digits > 0).ok_or_else(none)?;
+    let rounded = above.times((ONE, below.digits)).and_then(|(above, denominator)| {
+        let numerator = above.checked_mul(10i128.pow(below.places))?.checked_mul(2)?;
+        Some(numerator.checked_add(denominator)?.div_euclid(denominator.checked_mul(2)?))
+    });
+    match rounded {
+        Some(gain @ 0..=ONE) => Ok(gain as u32),
+        _ => Err(range(text, &GAIN, "0", "1")),
+    }
+}
+
 /// Reads a bit rate, `"12 Mbit/s"`.
 ///
 /// # Errors
@@ -287,13 +309,18 @@ fn ratio(text: &str, unit: &str, kind: &Kind, more: &[&str]) -> Result<(i128, i1
     let unit = SPELLINGS.iter().find(|(other, _)| *other == unit).map_or(unit, |&(_, usual)| usual);
     kind.units.iter().find(|(name, _)| *name == unit).map(|&(_, ratio)| ratio).ok_or_else(|| {
         let names: Vec<_> = kind.units.iter().map(|&(name, _)| name).chain(more.iter().copied()).collect();
-        QuantityError::Unit {
-            text: text.into(),
-            found: if unit.is_empty() { "no unit".into() } else { format!("the unit \"{unit}\"") },
-            noun: kind.noun,
-            units: names.join(", "),
-        }
+        QuantityError::Unit { text: text.into(), found: found(unit), noun: kind.noun, units: names.join(", ") }
     })
+}
+
+/// What stands in the place of a unit, in words.
+fn found(unit: &str) -> String {
+    let is_exponent = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-'));
+    match unit.strip_prefix(['e', 'E']) {
+        _ if unit.is_empty() => "no unit".into(),
+        Some(rest) if is_exponent(rest) => "an exponent, which is not read".into(),
+        _ => format!("the unit \"{unit}\""),
+    }
 }
 
 /// The whole number that `fraction` is.
@@ -321,6 +348,22 @@ mod tests {
 
     fn message<T: std::fmt::Debug>(result: Result<T, QuantityError>) -> String {
         result.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn gains_are_fractions_or_decimals() {
+        for (text, steps) in
+            [("1/4", 16_384), ("0.25", 16_384), ("1 / 32", 2_048), ("0", 0), ("1", 65_536), ("0.3", 19_661)]
+        {
+            assert_eq!(gain(text), Ok(steps), "{text}");
+        }
+        assert_eq!(gain("1/3"), Ok(21_845));
+        for text in ["1/0", "", "/", "1/", "a quarter", "1/-4", "1/2/2"] {
+            assert!(message(gain(text)).contains("is not a gain"), "{text}");
+        }
+        for text in ["-0.1", "2", "1.1", "999999999999999999999999/0.000000000000000000000001"] {
+            assert!(message(gain(text)).contains("is beyond the range of a gain, 0 to 1"), "{text}");
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Report: the summary of a run as text that fits a screen.
 
-use super::summary::{Distribution, LinkSummary, SlaveSummary, Summary};
+use super::summary::{Distribution, LedSummary, LinkSummary, SlaveSummary, Summary};
+use crate::observation::Leds;
 use crate::time::Span;
 
 /// Slaves that are shown; of more, the worst.
@@ -13,6 +14,7 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     let mut lines = Vec::new();
     network(summary, &mut lines);
     slaves(summary, &mut lines);
+    leds(summary, &mut lines);
     spread(summary, &mut lines);
     links(summary, &mut lines);
     fingerprint(summary, &mut lines);
@@ -97,6 +99,29 @@ fn slave_cells(slave: &SlaveSummary) -> Vec<String> {
     ]
 }
 
+/// Who shows something else than normal operation, a line per pattern.
+fn leds(summary: &Summary, lines: &mut Vec<String>) {
+    for pattern in Leds::ALL.iter().filter(|&&leds| leds != Leds::DataExchange) {
+        let leds = LedSummary::of(*pattern);
+        let shown = summary.slaves.iter().filter(|slave| slave.leds == Some(leds));
+        let slaves: Vec<_> = shown.map(|slave| slave.address).collect();
+        if !slaves.is_empty() {
+            let LedSummary { red, green, meaning } = leds;
+            lines.push(format!("LEDs red {red}, green {green} at slave {}: {meaning}", ranges(&slaves)));
+        }
+    }
+}
+
+/// Ascending numbers as `3..5, 9`.
+fn ranges(numbers: &[u8]) -> String {
+    let part = |run: &[u8]| match *run {
+        [first, _, .., last] => format!("{first}..{last}"),
+        [first, last] => format!("{first}, {last}"),
+        _ => run.iter().map(u8::to_string).collect(),
+    };
+    numbers.chunk_by(|a, b| a + 1 == *b).map(part).collect::<Vec<_>>().join(", ")
+}
+
 fn spread(summary: &Summary, lines: &mut Vec<String>) {
     let Some(skew) = summary.distribution("latch_skew").filter(|skew| skew.count > 0) else { return };
     let steps = summary.counts.skew_max_steps.map_or_else(String::new, |steps| format!(", {steps:.3} steps"));
@@ -166,7 +191,7 @@ fn files(summary: &Summary, dir: Option<&str>, lines: &mut Vec<String>) {
 
 /// Lines of a table whose columns are as wide as their widest cell; the columns of `left` are flush left, the others
 /// flush right.
-fn aligned(header: &[&str], left: &[usize], rows: &[Vec<String>]) -> Vec<String> {
+pub(super) fn aligned(header: &[&str], left: &[usize], rows: &[Vec<String>]) -> Vec<String> {
     let header = header.iter().map(|&title| title.to_owned()).collect::<Vec<_>>();
     let all = || std::iter::once(&header).chain(rows);
     let width = |column: usize| all().map(|row| row[column].chars().count()).max().unwrap_or(0);
@@ -226,6 +251,7 @@ T_DP 1 ms   T_DX up to 449 us, leaves 551 us   T_I 125 us   T_O 625 us   spare f
 slave  device   state      phase                 lock  PLL error p99     max  latch offset mean    max  faults
     3  encoder  POWER_ON   1 configuration          -              -       -                  -      -  -
     5  encoder  DATA_EXCH  5 operation      20 cycles          42 ns  -42 ns              45 ns  45 ns  1 x 0F04
+LEDs red dark, green dark at slave 3: no supply
 
 latch skew: p50 90 ns, p90 90 ns, p99 90 ns, p99.9 90 ns, max 90 ns, 0.250 steps
 
@@ -257,6 +283,25 @@ fingerprint: wire 0123456789abcdef
                 .unwrap_or_else(|| panic!("no {slave} in\n{text}"));
             assert!(line.ends_with(&format!("{} x 0F04", number + 1)), "{line}");
         }
+    }
+
+    #[test]
+    fn slaves_with_the_same_leds_share_a_line() {
+        let mut summary = summary(9);
+        for slave in &mut summary.slaves {
+            let leds = if slave.address == 7 { Leds::Refused } else { Leds::NotAddressed };
+            slave.leds = (slave.address != 10).then(|| LedSummary::of(leds));
+        }
+        let text = render(&summary, None);
+        assert!(
+            text.contains("\nLEDs red bright, green flashing at slave 7: parameters or configuration refused"),
+            "{text}"
+        );
+        assert!(
+            text.contains("\nLEDs red flashing, green bright at slave 3..6, 8, 9, 11: ready, its master"),
+            "{text}"
+        );
+        assert_eq!(text.matches("LEDs").count(), 2, "{text}");
     }
 
     #[test]

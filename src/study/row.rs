@@ -1,6 +1,6 @@
 //! Rows: what one T_DP left behind, per cycle, slave and link. Every export, histogram and plot reads these.
 
-use crate::observation::{Observation, Phase, PllState, SlaveState};
+use crate::observation::{Leds, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -21,7 +21,7 @@ pub struct CycleRow {
     pub t_dx: Option<Span>,
     /// Largest minus smallest latch offset over the locked slaves (Model: D9); none with fewer than two.
     pub latch_skew: Option<Span>,
-    /// The same in counts: largest minus smallest latch offset x speed of the slave's shaft [steps].
+    /// The same in counts: largest minus smallest latch offset x speed of the slave's shaft (steps).
     pub skew_counts: Option<f64>,
     /// Repeated requests.
     pub retries: u32,
@@ -46,6 +46,8 @@ pub struct SlaveRow {
     pub phase: Phase,
     /// State of the clock recovery at the end of the cycle.
     pub pll: PllState,
+    /// What the LEDs show at the end of the cycle (manual 5.2).
+    pub leds: Leds,
     /// Arrival of this cycle's SYNCH minus its prediction; none where it was not judged or missing.
     pub pll_error: Option<Span>,
     /// Recovered period; none before the clock recovery started.
@@ -108,7 +110,7 @@ pub trait Sink {
     fn slave(&mut self, _row: &SlaveRow) {}
     /// A link's part of a cycle is complete. Comes after the slaves'.
     fn link(&mut self, _row: &LinkRow) {}
-    /// Something rare happened. Comes at once.
+    /// Something rare happened. Comes as soon as its instant is over.
     fn event(&mut self, _row: &EventRow) {}
 }
 

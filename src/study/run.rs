@@ -1,9 +1,11 @@
 //! Run: one scenario from start to end, with everything that reads it, and the files it leaves.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::build;
-use super::export::{EXPORTERS, ExportError, Exports, Target};
+use super::count::Counts;
+use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
@@ -69,7 +71,7 @@ impl Speeds {
     fn of(scenario: &Scenario) -> Self {
         let mut speeds = vec![None; 128];
         for slave in &scenario.slaves {
-            let counts = slave.scaling.map_or(slave.device.steps_per_rev, |scaling| scaling.units_per_rev);
+            let counts = slave.scaling.map_or(slave.resolution().steps_per_rev, |scaling| scaling.units_per_rev);
             let shaft = Shaft::new(&slave.motion).expect("a checked motion");
             speeds[usize::from(slave.address.get())] = Some((shaft, f64::from(counts)));
         }
@@ -147,12 +149,13 @@ pub fn run<Q: Queue<NetworkEvent>>(
     let (counts, sinks) = metrics.finish(network.now());
 
     let summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
-    conclude(summary, sinks, bus.as_ref(), &fingerprints, dir)
+    conclude(summary, &counts, sinks, bus.as_ref(), &fingerprints, dir)
 }
 
-/// Adds the fingerprints, then writes the files.
+/// Adds the fingerprints and the LEDs, then writes the files.
 fn conclude(
     mut summary: Summary,
+    counts: &Counts,
     sinks: Sinks,
     bus: Option<&BusCycle>,
     fingerprints: &Fingerprints,
@@ -169,15 +172,28 @@ fn conclude(
         ("statistics", statistics),
     ];
     summary.fingerprint = texts.map(|(name, hash)| (name.to_owned(), format!("{hash:016x}"))).to_vec();
+    summary.show_leds(counts);
 
+    let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {
-        plots.write(dir, &distributions(&sinks.histograms), bus)?;
+        pictures = stage(dir, plots.pictures(&distributions(&sinks.histograms), bus)?)?;
         summary.files.extend(Plots::files().map(str::to_owned));
     }
     if let Some(exports) = sinks.exports {
-        exports.finish(&sinks.histograms, &mut summary)?;
+        exports.finish(pictures, &sinks.histograms, &mut summary)?;
     }
     Ok(Outcome { summary, fingerprint, stations: fingerprints.stations().collect(), statistics, dir })
+}
+
+/// Writes the pictures under temporary names.
+fn stage(dir: &Path, pictures: Vec<(&str, String)>) -> Result<Vec<Staged>, ExportError> {
+    let mut staged = Vec::with_capacity(pictures.len());
+    for (name, text) in pictures {
+        let mut file = Staged::create(dir, name)?;
+        file.write_all(text.as_bytes()).map_err(|error| file.error(error))?;
+        staged.push(file);
+    }
+    Ok(staged)
 }
 
 /// How many cycles the run will have, about: a scenario in time starts up for a moment before the first.

@@ -6,7 +6,7 @@ use super::histogram::Histograms;
 use super::layout::{Layout, SlaveLayout};
 use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
 use super::summary::{Facts, SlaveFacts, Summary};
-use crate::observation::{Observation, Phase, PllState, SlaveState};
+use crate::observation::{Leds, Observation, Phase, PllState, SlaveState};
 use crate::time::{BitRate, Span, Time};
 use crate::wire::Address;
 
@@ -44,6 +44,7 @@ pub(super) fn slave(cycle: u64, slave: u8) -> SlaveRow {
         state: SlaveState::DataExch,
         phase: Phase::Operation,
         pll: PllState::Locked,
+        leds: Leds::DataExchange,
         pll_error: Some(Span::from_ns(-42)),
         period: Some(Span::from_ms(1)),
         window: Some(Span::from_us(1)),
@@ -107,10 +108,12 @@ pub(super) fn run() -> Summary {
     counts.network.skew_counts = Some(0.25);
     let slave = &mut counts.slaves[1];
     (slave.state, slave.phase, slave.pll) = (SlaveState::DataExch, Phase::Operation, PllState::Locked);
+    slave.leds = Leds::DataExchange;
     slave.lock = Some(Lock { cycles: 20, span: Span::from_ms(20) });
     slave.faults.insert(0x0F04, 1);
     counts.finish(Time::ZERO + Span::from_s(10));
     let mut summary = Summary::new(facts, &counts, &histograms);
+    summary.show_leds(&counts);
     summary.thinning = vec![Thinning::new("cycles.csv", 1_000, 3, 1)];
     summary.files = vec!["cycles.csv".to_owned(), "summary.json".to_owned()];
     summary

@@ -10,20 +10,25 @@ pub mod error;
 #[cfg(test)]
 mod faults;
 pub mod kinds;
+mod options;
 mod read;
 mod section;
 mod tree;
 
 pub use error::{Fault, Position, Problem, ScenarioError};
 
+use crate::device::options::{Resolution, UnitOptions};
 use crate::device::profile::Profile;
+pub use crate::dp::handler::{Patch, StartupTelegram};
 use crate::fdl::params::BusParams;
 pub use crate::sim::fault::{Bursts, Disturbance, Service};
 use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
+pub use crate::wire::parameter::Format;
 use section::Reader;
+pub(super) use section::suggestion;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -68,7 +73,7 @@ impl Scenario {
         let source = path.display().to_string();
         let octets = read_file(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
         let text = decode(&octets).map_err(|fault| ScenarioError::about_file(&source, fault))?;
-        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = name_of(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
         Self::parse(&name, &source, text, overrides)
     }
 
@@ -137,6 +142,16 @@ fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
         return Err(too_long(5));
     }
     Ok(octets)
+}
+
+/// The scenario's name: the file's without its extension. Results go to a directory of this name.
+fn name_of(path: &Path) -> Result<String, Fault> {
+    match path.file_stem().map(|stem| stem.to_string_lossy().into_owned()) {
+        Some(name) if !matches!(name.as_str(), "." | "..") => Ok(name),
+        _ => Err(Fault::new("this file has no name before its extension")
+            .rule("the results of NAME.toml go to a directory NAME")
+            .help("rename it")),
+    }
 }
 
 /// The text that `octets` are, without a byte order mark.
@@ -229,6 +244,10 @@ pub struct Master {
     pub accumulate: bool,
     /// First value of its sign of life, 1..=15 (Model: D17).
     pub life_start: u8,
+    /// Cycles from a slave's data exchange in Operate to that value (Model: D17).
+    pub life_delay: u32,
+    /// Whether further tokens to itself fill the spare time (Model: D6).
+    pub active_spare: bool,
 }
 
 /// How far a crystal is off its nominal frequency (10^-9), positive is fast.
@@ -290,8 +309,6 @@ pub struct Slave {
     pub motion: Motion,
     /// Tolerated failures of the master's sign of life, octet 24 (manual 3.2.5).
     pub max_life_failures: u8,
-    /// Tolerated failures of the clock (Model: D15).
-    pub clock_tolerance: u8,
     /// Octet 15 bit 0 (manual 3.2.1).
     pub code_sequence: CodeSequence,
     /// Octet 15 bit 1: scaling, preset and code sequence are in force (manual 3.2.2).
@@ -302,6 +319,15 @@ pub struct Slave {
     pub silent: bool,
     /// When its supply comes on (true time).
     pub powered_at: Span,
+    /// Where it differs from the model's defaults (Model: D11, D12, D14 to D16, D18, D21).
+    pub options: UnitOptions,
+}
+
+impl Slave {
+    /// What its disc and gear tell apart: the type key's, or its profile's.
+    pub fn resolution(&self) -> Resolution {
+        self.options.resolution.unwrap_or(self.device.resolution())
+    }
 }
 
 /// The instants and the window of one slave's isochronous block.
@@ -390,6 +416,33 @@ pub enum Action {
         /// The word.
         value: u16,
     },
+    /// The master application reads a parameter over the parameter channel (manual 4).
+    ReadParameter {
+        /// Parameter number.
+        parameter: u16,
+        /// First element.
+        subindex: u16,
+        /// How many elements; 0 for a parameter that is no array.
+        elements: u8,
+    },
+    /// The master application tries to change a parameter.
+    ChangeParameter {
+        /// Parameter number.
+        parameter: u16,
+        /// The element.
+        subindex: u16,
+        /// Format of the value.
+        format: Format,
+        /// The value.
+        value: u32,
+    },
+    /// The master starts the slaves anew, with Set_Prm or Chk_Cfg changed; without changes with the good one.
+    Startup {
+        /// Which telegram.
+        telegram: StartupTelegram,
+        /// What is changed.
+        patch: Patch,
+    },
     /// The supply of the slaves goes off.
     PowerOff,
     /// The supply of the slaves comes on.
@@ -457,12 +510,12 @@ pub(crate) mod tests {
             times: IsoTimes { t_i, t_o, t_pll_w, t_pll_d: Span::ZERO },
             motion: Motion::Standstill { at: Angle::ZERO },
             max_life_failures: 1,
-            clock_tolerance: 1,
             code_sequence: CodeSequence::Cw,
             functions: false,
             scaling: None,
             silent: false,
             powered_at: Span::ZERO,
+            options: UnitOptions::default(),
         };
         Scenario {
             name: "network".into(),
@@ -483,6 +536,8 @@ pub(crate) mod tests {
                 gc_jitter: GcJitter::None,
                 accumulate: false,
                 life_start: 1,
+                life_delay: 0,
+                active_spare: false,
             },
             slaves: (3..3 + n).map(slave).collect(),
             links: Vec::new(),

@@ -6,6 +6,7 @@ use super::count::{Counts, SlaveCounts};
 use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
+use crate::observation::Leds;
 use crate::time::{BitRate, Span};
 use crate::wire::Address;
 
@@ -147,6 +148,9 @@ pub struct SlaveSummary {
     pub phase: &'static str,
     /// State of the clock recovery at the end.
     pub pll: &'static str,
+    /// What the LEDs show at the end; none before [`Summary::show_leds`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leds: Option<LedSummary>,
     /// T_I.
     #[serde(rename = "t_i_us", serialize_with = "us")]
     pub t_i: Span,
@@ -177,6 +181,24 @@ pub struct SlaveSummary {
     /// Distributions of the slave's quantities, by name.
     #[serde(serialize_with = "map")]
     pub distributions: Vec<(&'static str, Distribution)>,
+}
+
+/// What the two LEDs of a slave show (manual 5.2).
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct LedSummary {
+    /// The red one: dark, bright or flashing.
+    pub red: &'static str,
+    /// The green one.
+    pub green: &'static str,
+    /// What the manual says of this.
+    pub meaning: &'static str,
+}
+
+impl LedSummary {
+    /// The words for a pattern.
+    pub const fn of(leds: Leds) -> Self {
+        Self { red: leds.red().text(), green: leds.green().text(), meaning: leds.meaning() }
+    }
 }
 
 /// The latencies of one link.
@@ -283,6 +305,14 @@ impl Summary {
         }
     }
 
+    /// Adds what the LEDs of every slave show. They are words for people and no figures, so a hash of all figures does
+    /// without them; their changes are in the fingerprint of the states.
+    pub fn show_leds(&mut self, counts: &Counts) {
+        for (slave, counts) in self.slaves.iter_mut().zip(&counts.slaves) {
+            slave.leds = Some(LedSummary::of(counts.leds));
+        }
+    }
+
     /// A distribution of the network by the name of its quantity.
     pub fn distribution(&self, name: &str) -> Option<&Distribution> {
         named(&self.distributions, name)
@@ -357,6 +387,7 @@ fn slave(index: usize, facts: &Facts, counts: &Counts, histograms: &Histograms) 
         state: counts.state.text(),
         phase: counts.phase.text(),
         pll: counts.pll.text(),
+        leds: None,
         t_i: histograms.layout().slaves()[index].t_i,
         t_o: facts.t_o,
         lock_cycles: counts.lock.map(|lock| lock.cycles),

@@ -268,6 +268,39 @@ impl<'a> Iterator for Checked<'a> {
     }
 }
 
+/// What a parameter is about (manual 4).
+pub const fn name(pnu: u16) -> &'static str {
+    match pnu {
+        918 => "PROFIBUS address",
+        922 => "telegram number",
+        925 => "tolerated sign-of-life failures",
+        964 => "device identification",
+        965 => "profile number",
+        979 => "sensor format",
+        _ => "not known",
+    }
+}
+/// What an element of a parameter is about.
+pub const fn element(pnu: u16, subindex: u16) -> &'static str {
+    match (pnu, subindex) {
+        (964, 0) => "manufacturer",
+        (964, 1) => "device type",
+        (964, 2) => "firmware version",
+        (964, 3) => "firmware year",
+        (964, 4) => "firmware day and month",
+        (964, 5) => "number of axes",
+        (965, 0) => "profile number",
+        (965, 1) => "profile version",
+        (979, 0) => "header",
+        (979, 1) => "sensor type",
+        (979, 2) => "steps per revolution",
+        (979, 3) => "shift factor of G1_XIST1",
+        (979, 4) => "shift factor of G1_XIST2",
+        (979, 5) => "determinable revolutions",
+        _ => name(pnu),
+    }
+}
+
 /// A request for one or more parameters.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Request<'a> {

@@ -1,7 +1,7 @@
 //! CSV: cycles, slaves, links and events as tables for spreadsheets and data frames.
 //!
 //! The first line names the columns, with their units; a cell without value is empty. Times are exact decimals
-//! ([`Decimal`]), states are words, addresses, counters, `xist1` and `xist2` are decimal numbers, `g1_zsw` is
+//! ([`Decimal`]), states are words, LEDs two words, red/green, addresses, counters, `xist1` and `xist2` are decimal numbers, `g1_zsw` is
 //! hexadecimal (`0x1000`). Long runs are thinned by [`Thinning`]; `events.csv` keeps its first 100 000 rows. Both are
 //! stated in `summary.json` with the number of rows left out.
 
@@ -66,6 +66,7 @@ const SLAVE_COLUMNS: &[Column<SlaveRow>] = &[
     Column("g1_zsw", |row, cell| cell.put(format_args!("{:#06X}", row.g1_zsw))),
     Column("xist1", |row, cell| cell.put(row.xist1)),
     Column("xist2", |row, cell| cell.put(row.xist2)),
+    Column("leds", |row, cell| cell.put(row.leds)),
 ];
 
 #[rustfmt::skip]
@@ -299,8 +300,8 @@ mod tests {
             (
                 SLAVES,
                 "cycle t0_ns slave state phase pll pll_error_ns period_us window_ns latch_offset_ns mls sls life_counter \
-                 clock_counter g1_zsw xist1 xist2",
-                "7|7000000.000|3|DATA_EXCH|5 operation|locked|-42.000|1000.000000|1000.000|45.000|3|4|0|10|0x1000|4294967295|17",
+                 clock_counter g1_zsw xist1 xist2 leds",
+                "7|7000000.000|3|DATA_EXCH|5 operation|locked|-42.000|1000.000000|1000.000|45.000|3|4|0|10|0x1000|4294967295|17|dark/bright",
             ),
             (LINKS, "cycle publisher subscriber wire_ns publish_ns age_ns", "7|3|5|21000.000|400000.000|750000.000"),
             (EVENTS, "at_ns cycle station event", "7001000.000|7|5|fault 0F04"),

@@ -80,13 +80,18 @@ impl Exports {
         Ok(Self { open, names })
     }
 
-    /// The run is over: writes what is left and gives every file its name. Adds the names to the summary first.
+    /// The run is over: writes what is left and gives every file its name, those that are `staged` already included.
+    /// Adds the names of its own files to the summary first.
     ///
     /// # Errors
     /// The first one of the whole run; no file stays then.
-    pub fn finish(self, histograms: &Histograms, summary: &mut Summary) -> Result<Vec<PathBuf>, ExportError> {
+    pub fn finish(
+        self,
+        mut staged: Vec<Staged>,
+        histograms: &Histograms,
+        summary: &mut Summary,
+    ) -> Result<Vec<PathBuf>, ExportError> {
         summary.files.extend(self.names);
-        let mut staged = Vec::new();
         for export in self.open {
             staged.extend(export.close(histograms, summary)?);
         }
@@ -139,7 +144,7 @@ mod tests {
     }
     fn finish(exports: Exports) -> Result<Vec<PathBuf>, ExportError> {
         let mut summary = Summary { files: Vec::new(), ..sample::run() };
-        exports.finish(&Histograms::new(&sample::layout()), &mut summary)
+        exports.finish(Vec::new(), &Histograms::new(&sample::layout()), &mut summary)
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::chart::{Axis, Ruler, plain};
 use super::lanes::Lanes;
 use super::look::{
     Area, BLACK, BLUE, Canvas, FAINT, Font, GREEN, GREY, INK, Key, ORANGE, PURPLE, SKY, Shape, Swatch, VERMILION,
-    WIDTH, Words, empty_page, fit, legend, legend_height, page, text_width,
+    WHITE, WIDTH, Words, counted, empty_page, fit, legend, legend_height, page, spread, text_width,
 };
 use super::telegrams::{Bar, Cycle, Kind};
 use crate::time::Time;
@@ -19,6 +19,8 @@ const DIMENSION: i32 = 26;
 const DIMENSIONS: usize = 4;
 /// Height of the bus lane [px].
 const BUS: i32 = 36;
+/// Height of the names above the bus lane, with their leaders [px].
+const NAMES: i32 = LETTERS + 20;
 /// Letters in dimensions and above the bus lane [px].
 const LETTERS: i32 = 11;
 
@@ -128,7 +130,7 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     words.subtitle = subtitle(&view);
     let keys = keys(&view);
     let slaves = meta.slaves.len();
-    let above = DIMENSIONS as i32 * DIMENSION + LETTERS + 10;
+    let above = DIMENSIONS as i32 * DIMENSION + NAMES;
     let lanes_height = Lanes::each(slaves) * slaves as i32;
     let height = legend_height(&keys, WIDTH - 40) + above + BUS + 12 + lanes_height + Ruler::HEIGHT + 10;
     page(meta, &words, height, |canvas, mut area| {
@@ -145,6 +147,7 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
             slave_lane(canvas, &view, &ruler, (&lanes, index), slave);
         }
         dimensions(canvas, &view, &ruler, area.top);
+        names(canvas, &view, &ruler, top);
     })
 }
 
@@ -152,13 +155,13 @@ fn subtitle(view: &View<'_>) -> String {
     let number = view.cycle.number.map_or_else(String::new, |number| format!("cycle {number}, "));
     let dropped = match view.cycle.dropped {
         0 => String::new(),
-        more => format!(" {more} telegrams more are not shown."),
+        more => format!(" {more} more are not shown."),
     };
     format!(
-        "{number}{} slaves, {} telegrams, from SYNCH to the next SYNCH; t0 is the last bit of SYNCH, at {} s of the \
+        "{number}{}, {}, from SYNCH to the next SYNCH; t0 is the last bit of SYNCH, at {} s of the \
          run. Instants at the sender; a telegram shorter than a pixel is one pixel wide.{dropped}",
-        view.slaves.len(),
-        view.cycle.bars.len(),
+        counted(view.slaves.len() as u64, "slave"),
+        counted(view.cycle.bars.len() as u64, "telegram"),
         plain(view.t0.since_zero().as_s(), 6),
     )
 }
@@ -194,26 +197,44 @@ fn bus_lane(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, lane: Area)
     }
     let next = Area { left: ruler.x(view.next.0), right: ruler.x(view.next.1), ..lane };
     canvas.fill(next, colour(Kind::Synch));
-    let mut names: Vec<(Kind, i32, String)> = view
-        .cycle
-        .bars
-        .iter()
-        .filter(|bar| bar.asks)
-        .map(|bar| (bar.kind, i32::midpoint(place(bar).0, place(bar).1), name(bar)))
-        .collect();
-    names.push((Kind::Synch, next.centre().0, "SYNCH".to_owned()));
-    // The rare ones first: the slaves have lanes of their own.
-    names.sort_by_key(|entry| (entry.0 == Kind::Request, entry.1));
+}
+
+/// Names above the bus lane at `bottom`: first the rare ones, each with a leader, then the slaves as far as they fit.
+fn names(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, bottom: i32) {
+    let centre = |from: f64, to: f64| ruler.x(f64::midpoint(from, to));
+    let asking = view.cycle.bars.iter().filter(|bar| bar.asks);
+    let mut all: Vec<(Kind, i32, String)> =
+        asking.map(|bar| (bar.kind, centre(view.us(bar.start), view.us(bar.end)), name(bar))).collect();
+    all.push((Kind::Synch, centre(view.next.0, view.next.1), "SYNCH".to_owned()));
+    let (slaves, rare): (Vec<_>, Vec<_>) = all.into_iter().partition(|entry| entry.0 == Kind::Request);
+    let width = |name: &str| text_width(name, LETTERS) + 6;
+    let wanted: Vec<(i32, i32)> = rare.iter().map(|entry| (entry.1, width(&entry.2))).collect();
+    let needed: i32 = wanted.iter().map(|entry| entry.1).sum();
+    // A cycle full of acyclic messages or tokens: the colours have to do.
+    let room = (ruler.area.left - 20, ruler.area.right + 24);
+    let places = if needed <= room.1 - room.0 { spread(&wanted, room.0, room.1) } else { Vec::new() };
+    let y = bottom - NAMES + LETTERS / 2 + 2;
     let mut taken: Vec<(i32, i32)> = Vec::new();
-    for (_, centre, name) in names {
-        let half = text_width(&name, LETTERS) / 2 + 1;
-        let centre = centre.clamp(lane.left + half, lane.right + 20 - half);
-        let (left, right) = (centre - half, centre + half);
-        if taken.iter().all(|other| right + 4 <= other.0 || other.1 + 4 <= left) {
-            canvas.text((centre, lane.top - LETTERS / 2 - 3), &name, Font::new(LETTERS).middle());
+    for ((_, at, name), &place) in rare.iter().zip(&places) {
+        canvas.path(&[(place, y + LETTERS / 2 + 2), (*at, bottom - 1)], GREY, 1);
+        plate(canvas, (place, y), name, Font::new(LETTERS).middle());
+        taken.push((place - width(name) / 2, place + width(name) / 2));
+    }
+    for (_, at, name) in slaves {
+        let (left, right) = (at - width(&name) / 2, at + width(&name) / 2);
+        if taken.iter().all(|other| right + 2 <= other.0 || other.1 + 2 <= left) {
+            plate(canvas, (at, y), &name, Font::new(LETTERS).middle());
             taken.push((left, right));
         }
     }
+}
+
+/// A text in the middle of white, so that no line runs through it.
+fn plate(canvas: &mut Canvas<'_>, (x, y): (i32, i32), text: &str, font: Font) {
+    let half = text_width(text, LETTERS) / 2 + 1;
+    let high = LETTERS / 2 + 2;
+    canvas.fill(Area { left: x - half, top: y - high, right: x + half, bottom: y + high }, WHITE);
+    canvas.text((x, y), text, font);
 }
 
 fn name(bar: &Bar) -> String {
@@ -248,9 +269,20 @@ fn slave_lane(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, lane: (&L
     }
 }
 
-/// Dimension lines above the bus lane, each in the first row where it meets no other.
-fn dimensions(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, top: i32) {
+/// A dimension in its place.
+struct Placed {
+    label: String,
+    from: i32,
+    to: i32,
+    /// Middle of the label.
+    centre: i32,
+    y: i32,
+}
+
+/// Each dimension in the first row where it meets no other.
+fn place(view: &View<'_>, ruler: &Ruler, top: i32) -> Vec<Placed> {
     let mut rows: [Vec<(i32, i32)>; DIMENSIONS] = Default::default();
+    let mut placed = Vec::new();
     for dimension in view.dimensions() {
         let (from, to) = (ruler.x(dimension.from), ruler.x(dimension.to));
         let label = fit(&dimension.label, LETTERS, ruler.area.width() / 2);
@@ -258,23 +290,33 @@ fn dimensions(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, top: i32)
         // A label wider than its arrow stands on the side that has more room.
         let centre = if 2 * half <= to - from {
             i32::midpoint(from, to)
-        } else if to + 6 + 2 * half <= ruler.area.right {
-            to + 6 + half
+        } else if to + 10 + 2 * half <= ruler.area.right {
+            to + 10 + half
         } else {
-            from - 6 - half
+            from - 10 - half
         };
         let (left, right) = (from.min(centre - half), to.max(centre + half));
         let free = |row: &Vec<(i32, i32)>| row.iter().all(|other| right <= other.0 || other.1 <= left);
         let row = rows.iter().position(free).unwrap_or(DIMENSIONS - 1);
         rows[row].push((left, right));
-        let y = top + (row as i32 + 1) * DIMENSION - 4;
-        for x in [from, to] {
-            canvas.dashes((x, y - 4), (x, ruler.area.bottom), GREY);
+        placed.push(Placed { label, from, to, centre, y: top + (row as i32 + 1) * DIMENSION - 4 });
+    }
+    placed
+}
+
+/// Dimension lines above the bus lane.
+fn dimensions(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, top: i32) {
+    let placed = place(view, ruler, top);
+    for dimension in &placed {
+        for x in [dimension.from, dimension.to] {
+            canvas.dashes((x, dimension.y - 4), (x, ruler.area.bottom), GREY);
         }
+    }
+    for Placed { label, from, to, centre, y } in placed {
         arrow(canvas, from, to, y);
         let beside = centre < from || centre > to;
         let text_y = if beside { y } else { y - LETTERS / 2 - 4 };
-        canvas.text((centre, text_y), &label, Font::new(LETTERS).middle().bold());
+        plate(canvas, (centre, text_y), &label, Font::new(LETTERS).middle().bold());
     }
 }
 

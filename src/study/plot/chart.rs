@@ -2,7 +2,7 @@
 
 use plotters::style::RGBColor;
 
-use super::distribution::Distribution;
+use super::distribution::{Distribution, Grid};
 use super::look::{Area, Canvas, Font, GREY, INK, PALE, WHITE, spread, text_width};
 
 const TICK: i32 = 11;
@@ -39,6 +39,13 @@ impl Axis {
         let axis = Self::linear(name, lo, hi);
         let air = (axis.hi - axis.lo) * 0.05;
         Self { lo: axis.lo - air, hi: axis.hi + air, ..axis }
+    }
+    /// Over the columns of a histogram with air on both ends, and so wide that one column alone looks narrow.
+    pub(super) fn over(name: impl Into<String>, grid: &Grid) -> Self {
+        const NARROW: f64 = 16.0;
+        let (lo, hi) = (grid.left(0), grid.right());
+        let missing = (NARROW * (grid.left(1) - lo) - (hi - lo)).max(0.0) / 2.0;
+        Self::airy(name, lo - missing, hi + missing)
     }
     /// Counts from 0 to `hi`, logarithmic.
     pub(super) fn counts(name: impl Into<String>, hi: f64) -> Self {
@@ -115,13 +122,25 @@ fn linear_ticks(lo: f64, hi: f64, most: usize) -> Vec<(f64, String)> {
     (first..=last).map(|index| index as f64 * step).map(|value| (value, plain(value, decimals))).collect()
 }
 
-/// A number with `decimals` places and without a negative zero.
+/// A number with `decimals` places, without a negative zero, from six digits on in groups of three.
 pub(super) fn plain(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(zero) if zero.chars().all(|c| matches!(c, '0' | '.')) => zero.to_owned(),
-        _ => text,
+    let (sign, digits) = text.strip_prefix('-').map_or(("", text.as_str()), |digits| ("-", digits));
+    if digits.chars().all(|c| matches!(c, '0' | '.')) {
+        return digits.to_owned();
     }
+    let whole = digits.find('.').unwrap_or(digits.len());
+    if whole < 6 {
+        return text;
+    }
+    let mut grouped = String::from(sign);
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && index < whole && (whole - index).is_multiple_of(3) {
+            grouped.push(' ');
+        }
+        grouped.push(digit);
+    }
+    grouped
 }
 
 /// A value in at most four digits, for labels.
@@ -137,6 +156,7 @@ pub(super) fn short(value: f64) -> String {
 }
 
 /// A level axis under an area.
+#[derive(Clone)]
 pub(super) struct Ruler {
     pub(super) area: Area,
     axis: Axis,
@@ -213,6 +233,11 @@ impl Chart {
         chart
     }
 
+    /// Part of a drawing that has its x axis already; draws nothing.
+    pub(super) fn inside(area: Area, ruler: &Ruler, y: Axis) -> Self {
+        Self { area, ruler: ruler.clone(), y }
+    }
+
     /// Pixel of a value of the x axis.
     pub(super) fn x(&self, value: f64) -> i32 {
         self.ruler.x(value)
@@ -236,32 +261,32 @@ impl Chart {
         opacity: f64,
     ) {
         for run in runs(points, step) {
-            let over = run.iter().flat_map(|&(x, _, hi)| [self.at(x, hi), self.at(x + step, hi)]);
-            let under = run.iter().rev().flat_map(|&(x, lo, _)| [self.at(x + step, lo), self.at(x, lo)]);
+            // At least two pixels high, or it could not be seen.
+            let air = |lo: f64, hi: f64| i32::from(self.y(lo) - self.y(hi) < 2);
+            let over = run.iter().flat_map(|&(x, lo, hi)| {
+                let y = self.y(hi) - air(lo, hi);
+                [(self.x(x), y), (self.x(x + step), y)]
+            });
+            let under = run.iter().rev().flat_map(|&(x, lo, hi)| {
+                let y = self.y(lo) + air(lo, hi);
+                [(self.x(x + step), y), (self.x(x), y)]
+            });
             let mut outline: Vec<_> = over.chain(under).collect();
             outline.dedup();
             canvas.polygon(&outline, colour, opacity);
-            // A band without height would be invisible.
-            let line = run.iter().flat_map(|&(x, lo, hi)| {
-                let y = f64::midpoint(lo, hi);
-                [self.at(x, y), self.at(x + step, y)]
-            });
-            let mut line: Vec<_> = line.collect();
-            line.dedup();
-            canvas.path(&line, colour, 1);
         }
     }
 
-    /// The outline of equal columns from `lo` to `hi` of the x axis.
-    pub(super) fn outline(&self, canvas: &mut Canvas<'_>, lo: f64, hi: f64, counts: &[f64], colour: RGBColor) {
-        let width = (hi - lo) / counts.len() as f64;
-        let mut path = vec![self.at(lo, 0.0)];
-        for (index, &count) in counts.iter().enumerate() {
-            let left = lo + index as f64 * width;
-            path.push(self.at(left, count));
-            path.push(self.at(left + width, count));
+    /// The outline of columns, from the first to the last that is not empty.
+    pub(super) fn outline(&self, canvas: &mut Canvas<'_>, grid: &Grid, counts: &[f64], colour: RGBColor) {
+        let Some(first) = counts.iter().position(|&count| count > 0.0) else { return };
+        let last = counts.iter().rposition(|&count| count > 0.0).unwrap_or(first);
+        let mut path = vec![self.at(grid.left(first), 0.0)];
+        for (index, &count) in counts.iter().enumerate().take(last + 1).skip(first) {
+            path.push(self.at(grid.left(index), count));
+            path.push(self.at(grid.left(index + 1), count));
         }
-        path.push(self.at(hi, 0.0));
+        path.push(self.at(grid.left(last + 1), 0.0));
         path.dedup();
         canvas.path(&path, colour, 2);
     }
@@ -315,5 +340,7 @@ mod tests {
             assert_eq!(short(value), text);
         }
         assert_eq!(plain(-0.001, 1), "0.0");
+        assert_eq!(plain(-12_345_678.9, 1), "-12 345 678.9");
+        assert_eq!(plain(12_345.0, 0), "12345");
     }
 }

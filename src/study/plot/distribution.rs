@@ -35,9 +35,9 @@ pub struct LinkLatencies {
 /// Everything counted that the pictures show.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Distributions {
-    /// Latch skew per cycle [ns].
+    /// Latch skew per cycle (ns).
     pub latch_skew: Distribution,
-    /// Length of each cycle minus the nominal T_DP [ns].
+    /// Length of each cycle minus the nominal T_DP (ns).
     pub t_dp_deviation: Distribution,
     /// Per link.
     pub links: Vec<LinkLatencies>,
@@ -53,20 +53,25 @@ impl Distribution {
         })
     }
 
-    /// Counts in `columns` equal columns between `lo` and `hi`; a bin wider than a column is shared out evenly.
-    pub(super) fn columns(&self, lo: f64, hi: f64, columns: usize) -> Vec<f64> {
-        let mut counts = vec![0.0; columns];
-        let width = (hi - lo) / columns as f64;
-        let column = |value: f64| (((value - lo) / width).floor().max(0.0) as usize).min(columns - 1);
+    /// Width of the narrowest bin that has a width.
+    fn finest(&self) -> Option<f64> {
+        self.bins.iter().map(|bin| bin.1 - bin.0).filter(|&width| width > 0.0).reduce(f64::min)
+    }
+
+    /// Counts in the columns of `grid`; a bin wider than a column is shared out evenly.
+    pub(super) fn columns(&self, grid: &Grid) -> Vec<f64> {
+        let mut counts = vec![0.0; grid.columns];
+        // A bin that ends where a column ends belongs to this column alone.
+        let slack = grid.width * 1e-6;
         for &(from, to, n) in self.bins.iter().filter(|bin| bin.2 > 0) {
-            let (first, last) = (column(from), column(to));
+            let (first, last) = (grid.column(from + slack), grid.column((to - slack).max(from + slack)));
             if first == last {
                 counts[first] += n as f64;
                 continue;
             }
             for (index, count) in counts.iter_mut().enumerate().take(last + 1).skip(first) {
-                let left = lo + index as f64 * width;
-                let overlap = (to.min(left + width) - from.max(left)).max(0.0);
+                let left = grid.left(index);
+                let overlap = (to.min(left + grid.width) - from.max(left)).max(0.0);
                 *count += n as f64 * overlap / (to - from);
             }
         }
@@ -80,6 +85,38 @@ impl Distribution {
     }
 }
 
+/// Equal columns, each a whole number of the narrowest bins, so that no column gets more bins than its neighbour.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Grid {
+    lo: f64,
+    width: f64,
+    columns: usize,
+}
+
+impl Grid {
+    /// At most `most` columns over everything that was counted; none if nothing was.
+    pub(super) fn over<'a>(all: impl Iterator<Item = &'a Distribution> + Clone, most: usize) -> Option<Self> {
+        let ranges = all.clone().filter_map(Distribution::range);
+        let (lo, hi) = ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        let finest = all.filter_map(Distribution::finest).reduce(f64::min).unwrap_or(1.0);
+        let bins = ((hi - lo) / finest).round().max(1.0);
+        let width = finest * (bins / most as f64).ceil();
+        let columns = (((hi - lo) / width - 1e-9).ceil() as usize).clamp(1, most);
+        Some(Self { lo, width, columns })
+    }
+    fn column(&self, value: f64) -> usize {
+        (((value - self.lo) / self.width).floor().max(0.0) as usize).min(self.columns - 1)
+    }
+    /// Where column `index` begins.
+    pub(super) fn left(&self, index: usize) -> f64 {
+        self.lo + index as f64 * self.width
+    }
+    /// Where the last column ends.
+    pub(super) fn right(&self) -> f64 {
+        self.left(self.columns)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,9 +127,22 @@ mod tests {
         let distribution = Distribution { bins, ..Distribution::default() };
         assert_eq!(distribution.range(), Some((0.0, 10.0)));
         for columns in [1, 3, 10, 64] {
-            let total: f64 = distribution.columns(0.0, 10.0, columns).iter().sum();
-            assert!((total - 43.0).abs() < 1e-9, "{columns} columns hold {total}");
+            let grid = Grid::over(std::iter::once(&distribution), columns).unwrap();
+            let counts = distribution.columns(&grid);
+            let total: f64 = counts.iter().sum();
+            assert!((total - 43.0).abs() < 1e-9 && counts.len() <= columns, "{columns} columns hold {total}");
         }
         assert_eq!(Distribution::default().range(), None);
+        assert_eq!(Grid::over(std::iter::empty(), 5), None);
+    }
+
+    #[test]
+    fn columns_are_as_even_as_their_bins() {
+        let bins = (0..1_000).map(|bin| (f64::from(bin), f64::from(bin + 1), 2)).collect();
+        let distribution = Distribution { bins, ..Distribution::default() };
+        let grid = Grid::over(std::iter::once(&distribution), 120).unwrap();
+        let counts = distribution.columns(&grid);
+        assert_eq!(counts.len(), 112);
+        assert!(counts[..111].iter().all(|&count| (count - 18.0).abs() < 1e-9), "{counts:?}");
     }
 }

@@ -2,7 +2,8 @@
 
 use super::Material;
 use super::chart::{Axis, Chart};
-use super::look::{Area, BLUE, Key, Swatch, VERMILION, Words, empty_page, legend, page};
+use super::distribution::Grid;
+use super::look::{Area, BLUE, Key, Swatch, VERMILION, Words, counted, empty_page, legend, page};
 
 const COLUMNS: usize = 120;
 
@@ -12,14 +13,14 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let mut words = Words {
         title: "Latch skew: largest minus smallest latch instant of the locked slaves in one cycle",
         subtitle: format!(
-            "{} cycles with at least two locked slaves, of {} slaves in all. Height: cycles per column, logarithmic.",
-            skew.count,
-            material.meta.slaves.len()
+            "{} with at least two locked slaves, of {} in all. Height: cycles per column, logarithmic.",
+            counted(skew.count, "cycle"),
+            counted(material.meta.slaves.len() as u64, "slave")
         ),
         plotted: "latch skew per cycle, histogram",
     };
-    let Some((lo, hi)) = skew.range() else {
-        "Histogram over all cycles.".clone_into(&mut words.subtitle);
+    let Some(grid) = Grid::over(std::iter::once(skew), COLUMNS) else {
+        "histogram over all cycles.".clone_into(&mut words.subtitle);
         let why = "No latch skew was recorded: in no cycle were two slaves locked to the clock at once.";
         return empty_page(material.meta, &words, why);
     };
@@ -29,17 +30,17 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
             Key::new("percentiles and maximum", VERMILION, Swatch::Dashes),
         ];
         legend(canvas, &mut area, &keys);
-        let x = Axis::airy(format!("latch skew [{}]", skew.unit), lo.min(0.0), hi.max(skew.top()));
-        let counts = skew.columns(lo, if hi > lo { hi } else { lo + 1.0 }, COLUMNS);
+        // From zero, so that the skew is seen for what it is.
+        let fitting = Axis::over(format!("latch skew [{}]", skew.unit), &grid);
+        let x = Axis { lo: fitting.lo.min(-0.02 * fitting.hi), ..fitting };
+        let counts = skew.columns(&grid);
         let most = counts.iter().copied().fold(0.0, f64::max);
         let outer = Area { top: area.top + 44, ..area };
         let chart = Chart::draw(canvas, outer, x, Axis::counts("cycles (logarithmic)", most));
-        let width = if hi > lo { (hi - lo) / COLUMNS as f64 } else { 1.0 };
         let base = chart.y(0.0);
         for (index, &count) in counts.iter().enumerate().filter(|column| *column.1 > 0.0) {
-            let left = lo + index as f64 * width;
-            let top = chart.y(count).min(base - 1);
-            canvas.fill(Area { left: chart.x(left), top, right: chart.x(left + width), bottom: base }, BLUE);
+            let (left, right) = (chart.x(grid.left(index)), chart.x(grid.left(index + 1)));
+            canvas.fill(Area { left, top: chart.y(count).min(base - 1), right, bottom: base }, BLUE);
         }
         chart.marks_above(canvas, skew, VERMILION);
     })

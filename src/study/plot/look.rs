@@ -25,6 +25,10 @@ pub(super) const GREY: RGBColor = RGBColor(0x66, 0x66, 0x66);
 pub(super) const PALE: RGBColor = RGBColor(0xDD, 0xDD, 0xDD);
 /// Empty lanes.
 pub(super) const FAINT: RGBColor = RGBColor(0xF3, 0xF3, 0xF3);
+/// A lamp without light.
+const UNLIT: RGBColor = RGBColor(0xD9, 0xD9, 0xD9);
+/// Width of the stripes of a flashing lamp [px].
+const STRIPE: i32 = 4;
 /// Paper.
 pub(super) const WHITE: RGBColor = RGBColor(0xFF, 0xFF, 0xFF);
 
@@ -168,6 +172,12 @@ impl Canvas<'_> {
             self.path(&[(from.0 + dx * start, from.1 + dy * start), (from.0 + dx * end, from.1 + dy * end)], colour, 1);
         }
     }
+    /// Upright stripes over a level strip, one drawn, one left out, each `width` [px].
+    pub(super) fn stripes(&mut self, area: Area, width: i32, colour: RGBColor) {
+        for left in (area.left..area.right).step_by(2 * width as usize) {
+            self.fill(Area { left, right: (left + width).min(area.right), ..area }, colour);
+        }
+    }
     /// A filled polygon.
     pub(super) fn polygon(&mut self, points: &[(i32, i32)], colour: RGBColor, opacity: f64) {
         let drawn = self.svg.fill_polygon(points.iter().copied(), &see_through(colour, opacity));
@@ -272,6 +282,11 @@ pub(super) fn spread(wanted: &[(i32, i32)], lo: i32, hi: i32) -> Vec<i32> {
     centres
 }
 
+/// `1 slave`, `8 slaves`.
+pub(super) fn counted(number: u64, of: &str) -> String {
+    format!("{number} {of}{}", if number == 1 { "" } else { "s" })
+}
+
 /// The words around a picture.
 pub(super) struct Words<'a> {
     /// What is shown.
@@ -298,11 +313,11 @@ pub(super) fn page(
     let bottom = top + body_height;
     let height = bottom + FOOTER + 2 * MARGIN;
     let footer = format!(
-        "isodp | scenario {}, seed {}, T_DP {}, {} slaves, {} | {}",
+        "isodp | scenario {}, seed {}, T_DP {}, {}, {} | {}",
         fit(&meta.scenario, FOOTER, room / 3),
         meta.seed,
         meta.t_dp,
-        meta.slaves.len(),
+        counted(meta.slaves.len() as u64, "slave"),
         meta.duration,
         words.plotted
     );
@@ -354,6 +369,16 @@ pub(super) enum Swatch {
     LineMark(Shape),
     Ring,
     Dashes,
+    /// A lamp: a strip on dark ground, see [`Lit`].
+    Lamp(Lit),
+}
+
+/// How a lamp is drawn: its strip full, striped or left dark.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Lit {
+    Full,
+    Striped,
+    Dark,
 }
 
 /// One entry of a legend.
@@ -401,6 +426,14 @@ pub(super) fn legend(canvas: &mut Canvas<'_>, area: &mut Area, keys: &[Key]) {
     area.top += legend_height(keys, area.width());
 }
 
+/// Draws the strip of a lamp.
+pub(super) fn lamp(canvas: &mut Canvas<'_>, area: Area, lit: Lit, colour: RGBColor) {
+    canvas.fill(area, if lit == Lit::Full { colour } else { UNLIT });
+    if lit == Lit::Striped {
+        canvas.stripes(area, STRIPE, colour);
+    }
+}
+
 /// Draws the 26 pixels in front of a legend's text.
 pub(super) fn swatch(canvas: &mut Canvas<'_>, (x, y): (i32, i32), key: &Key) {
     let block = Area { left: x, top: y - 6, right: x + 26, bottom: y + 6 };
@@ -409,6 +442,7 @@ pub(super) fn swatch(canvas: &mut Canvas<'_>, (x, y): (i32, i32), key: &Key) {
         Swatch::Pale => canvas.tint(block, key.colour, 0.25),
         Swatch::Line => canvas.path(&[(x, y), (x + 26, y)], key.colour, 2),
         Swatch::Dashes => canvas.dashes((x, y), (x + 26, y), key.colour),
+        Swatch::Lamp(lit) => lamp(canvas, Area { top: y - 2, bottom: y + 3, ..block }, lit, key.colour),
         Swatch::Ring => canvas.ring((x + 13, y), 6, key.colour),
         Swatch::Mark(shape) => mark(canvas, (x + 13, y), shape, key.colour),
         Swatch::LineMark(shape) => {

@@ -3,7 +3,8 @@
 use super::Material;
 use super::chart::{Axis, Chart};
 use super::look::{
-    Area, BLACK, BLUE, Canvas, GREY, Key, MAX_SERIES, SKY, Swatch, VERMILION, Words, empty_page, legend, page, series,
+    Area, BLACK, BLUE, Canvas, GREY, Key, MAX_SERIES, SKY, Swatch, VERMILION, Words, counted, empty_page, legend, page,
+    series,
 };
 use crate::observation::PllState;
 use crate::study::row::SlaveRow;
@@ -13,8 +14,8 @@ use crate::time::Span;
 const CYCLES: usize = 120;
 /// What is shown after the last lock [cycles].
 const AFTER_LOCK: usize = 20;
-/// Errors below this are drawn linearly [ns]: about half a timer quantum.
-const LINEAR: f64 = 10.0;
+/// Errors below this are drawn linearly [ns]: five timer quanta, so that rounding does not look like a swing.
+const LINEAR: f64 = 100.0;
 
 /// One clock instant of one slave.
 #[derive(Clone, Copy, Debug)]
@@ -87,9 +88,10 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let words = Words {
         title: "PLL convergence: arrival of SYNCH minus its prediction during start-up, and the clock window",
         subtitle: format!(
-            "{started} of {} slaves started their clock recovery, {locked} locked. First {cycles} cycles, counted from \
+            "{started} of {} started the clock recovery, {locked} locked. First {}, counted from \
              each slave's own first clock. {how} Above ±{LINEAR} ns the axis is logarithmic.",
-            material.meta.slaves.len()
+            counted(material.meta.slaves.len() as u64, "slave"),
+            counted(cycles as u64, "cycle"),
         ),
         plotted: "PLL error and window of each slave's first start-up",
     };

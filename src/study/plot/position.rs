@@ -3,14 +3,19 @@
 use plotters::style::RGBColor;
 
 use super::buckets::{Buckets, Envelope};
-use super::chart::{Axis, Chart, Ruler, short};
+use super::chart::{Axis, Chart, Ruler, plain};
 use super::lanes::Lanes;
 use super::look::{
-    Area, Canvas, Key, MAX_SERIES, Swatch, WIDTH, Words, empty_page, legend, legend_height, page, series,
+    Area, BLUE, Canvas, Font, Key, MAX_SERIES, PALE, Swatch, WIDTH, Words, counted, empty_page, legend, legend_height,
+    page,
 };
 use super::{Material, PlotMeta};
 use crate::study::row::SlaveRow;
 
+/// Height of the lane of a slave [px].
+const LANE: i32 = 64;
+/// Room for the ends of a lane's scale [px].
+const ENDS: i32 = 100;
 /// Columns of the heat strips.
 const COLUMNS: usize = 128;
 /// Shades of the heat strips.
@@ -39,6 +44,13 @@ struct Track {
     points: Vec<(u64, f64, f64)>,
 }
 
+impl Track {
+    /// The points with their time instead of their cycle.
+    fn scaled(&self, cycle: f64) -> Vec<(f64, f64, f64)> {
+        self.points.iter().map(|&(first, lo, hi)| (first as f64 * cycle, lo, hi)).collect()
+    }
+}
+
 fn tracks(material: &Material<'_>) -> Vec<Track> {
     let all = material.meta.slaves.iter().zip(&material.plots.position.0);
     let filled = all.filter(|(_, buckets)| !buckets.is_empty());
@@ -63,13 +75,13 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let how = if many {
         "Too many slaves to tell apart: one strip per slave, the darker the higher its position."
     } else if each > 1 {
-        "From the smallest to the largest value of each piece of time."
+        "Bands from the smallest to the largest value of each piece of time."
     } else {
         "Every cycle."
     };
     let words = Words {
         title: "Position: G1_XIST1 as latched by each slave with a locked clock",
-        subtitle: format!("{} of {} slaves. {how}", tracks.len(), material.meta.slaves.len()),
+        subtitle: format!("{} of {}. {how}", tracks.len(), counted(material.meta.slaves.len() as u64, "slave")),
         plotted: "latched G1_XIST1 over time",
     };
     if tracks.is_empty() {
@@ -83,17 +95,37 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
         return strips(material.meta, &words, &tracks, cycles, (lo, hi));
     }
     let (unit, cycle) = material.meta.time_unit(cycles);
-    page(material.meta, &words, 560, |canvas, mut area| {
-        let keys = tracks.iter().enumerate();
-        let keys: Vec<Key> = keys.map(|(i, track)| Key::new(&track.name, series(i).0, Swatch::Fill)).collect();
-        legend(canvas, &mut area, &keys);
-        let x = Axis::linear(format!("time [{unit}]"), 0.0, cycles as f64 * cycle);
-        let chart = Chart::draw(canvas, area, x, Axis::airy("G1_XIST1 [steps]", lo, hi));
-        for (index, track) in tracks.iter().enumerate() {
-            let points: Vec<_> = track.points.iter().map(|p| (p.0 as f64 * cycle, p.1, p.2)).collect();
-            chart.band(canvas, &points, track.each as f64 * cycle, series(index).0, 0.5);
-        }
+    let x = Axis::linear(format!("time [{unit}]"), 0.0, cycles as f64 * cycle);
+    if let [track] = &tracks[..] {
+        return page(material.meta, &words, 560, |canvas, mut area| {
+            legend(canvas, &mut area, &[Key::new(&track.name, BLUE, Swatch::Fill)]);
+            let chart = Chart::draw(canvas, area, x, Axis::airy("G1_XIST1 [steps]", lo, hi));
+            chart.band(canvas, &track.scaled(cycle), track.each as f64 * cycle, BLUE, 0.5);
+        });
+    }
+    page(material.meta, &words, LANE * tracks.len() as i32 + Ruler::HEIGHT + 34, |canvas, mut area| {
+        let key = format!("G1_XIST1 [steps], every lane from {} to {}", plain(lo, 0), plain(hi, 0));
+        legend(canvas, &mut area, &[Key::new(key, BLUE, Swatch::Fill)]);
+        lanes(canvas, area, &tracks, &x, (lo, hi), cycle);
     })
+}
+
+/// One band below the other, all on the same scale.
+fn lanes(canvas: &mut Canvas<'_>, area: Area, tracks: &[Track], x: &Axis, (lo, hi): (f64, f64), cycle: f64) {
+    let bottom = area.top + LANE * tracks.len() as i32;
+    let plot = Area { left: area.left + Lanes::NAMES, top: area.top, right: area.right - ENDS, bottom };
+    let ruler = Ruler::draw(canvas, plot, x.clone());
+    let y = Axis::linear("", lo, hi);
+    for (index, track) in tracks.iter().enumerate() {
+        let top = plot.top + LANE * index as i32;
+        let place = Area { top: top + 3, bottom: top + LANE - 6, ..plot };
+        canvas.border(place, PALE);
+        canvas.text((plot.left - 8, place.centre().1), &track.name, Font::new(12).right());
+        canvas.text((plot.right + 8, place.top + 5), &plain(y.hi, 0), Font::new(10));
+        canvas.text((plot.right + 8, place.bottom - 5), &plain(y.lo, 0), Font::new(10));
+        let chart = Chart::inside(place, &ruler, y.clone());
+        chart.band(canvas, &track.scaled(cycle), track.each as f64 * cycle, BLUE, 0.6);
+    }
 }
 
 /// From white to blue.
@@ -117,7 +149,7 @@ fn strips(
     let keys: Vec<Key> = (0..SHADES)
         .map(|level| {
             let from = lo + step * level as f64;
-            Key::new(format!("{} to {} steps", short(from), short(from + step)), shade(level), Swatch::Fill)
+            Key::new(format!("{} to {} steps", plain(from, 0), plain(from + step, 0)), shade(level), Swatch::Fill)
         })
         .collect();
     let lanes_height = Lanes::each(tracks.len()) * tracks.len() as i32;

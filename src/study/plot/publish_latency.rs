@@ -3,17 +3,17 @@
 use plotters::style::RGBColor;
 
 use super::Material;
-use super::chart::{Axis, Chart, short};
-use super::distribution::{Distribution, LinkLatencies};
+use super::chart::{Axis, Chart, plain};
+use super::distribution::{Distribution, Grid, LinkLatencies};
 use super::look::{
-    Area, Canvas, Font, GREY, INK, Key, Swatch, VERMILION, Words, empty_page, fit, page, series, swatch, text_width,
+    Area, BLUE, Canvas, Font, GREY, INK, Key, Swatch, VERMILION, Words, counted, empty_page, fit, page, series, swatch,
 };
 
 const COLUMNS: usize = 100;
 /// Height of a panel [px].
 const PANEL: i32 = 300;
 /// Width of the table beside a panel [px].
-const TABLE: i32 = 470;
+const TABLE: i32 = 510;
 /// Width of the links' names in the table [px].
 const NAMES: i32 = 190;
 /// Most links that are drawn one by one.
@@ -42,13 +42,13 @@ struct Entry<'a> {
 pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let links = &material.distributions.links;
     let how = if links.len() > MAX_LINKS {
-        "Too many links to tell apart: the sum of all links and the link with the largest value."
+        "Too many links to tell apart: the sum of all links and the links with the smallest and the largest maximum."
     } else {
-        "One outline per link."
+        "One outline per link; where outlines coincide the last one is seen, the table names all."
     };
     let words = Words {
         title: "Publish latency: how old slave-to-slave data are, per link",
-        subtitle: format!("{} links. {how} Height: cycles per column, logarithmic.", links.len()),
+        subtitle: format!("{}. {how} Height: cycles per column, logarithmic.", counted(links.len() as u64, "link")),
         plotted: "wire latency, publish latency and age at use per link, histograms",
     };
     if links.iter().all(|link| KINDS.iter().all(|kind| (kind.of)(link).range().is_none())) {
@@ -71,19 +71,17 @@ fn panel(canvas: &mut Canvas<'_>, area: Area, kind: &Kind, links: &[LinkLatencie
     canvas.text((area.left, area.top + 14), kind.title, Font::new(14).bold());
     let filled: Vec<&LinkLatencies> = links.iter().filter(|link| (kind.of)(link).range().is_some()).collect();
     let body = Area { top: area.top + 30, ..area };
-    let ranges = filled.iter().filter_map(|link| (kind.of)(link).range());
-    let Some((lo, hi)) = ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
+    let Some(grid) = Grid::over(filled.iter().map(|link| (kind.of)(link)), COLUMNS) else {
         canvas.text(body.centre(), "Nothing of this kind was recorded.", Font::new(14).middle().ink(GREY));
         return;
     };
-    let x = Axis::airy("latency [us]", lo, hi);
-    let (lo, hi) = (x.lo, x.hi);
-    let entries = entries(kind, &filled, lo, hi);
+    let x = Axis::over("latency [us]", &grid);
+    let entries = entries(kind, &filled, &grid);
     let most = entries.iter().flat_map(|entry| entry.counts.iter().copied()).fold(0.0, f64::max);
     let outer = Area { right: area.right - TABLE, ..body };
     let chart = Chart::draw(canvas, outer, x, Axis::counts("cycles (logarithmic)", most));
     for entry in &entries {
-        chart.outline(canvas, lo, hi, &entry.counts, entry.key.colour);
+        chart.outline(canvas, &grid, &entry.counts, entry.key.colour);
     }
     table(canvas, Area { left: area.right - TABLE, ..body }, &entries);
 }
@@ -92,25 +90,38 @@ fn name(link: &LinkLatencies) -> String {
     format!("{} → {}", link.publisher, link.subscriber)
 }
 
-fn entries<'a>(kind: &Kind, links: &[&'a LinkLatencies], lo: f64, hi: f64) -> Vec<Entry<'a>> {
+fn entries<'a>(kind: &Kind, links: &[&'a LinkLatencies], grid: &Grid) -> Vec<Entry<'a>> {
     let entry = |label: String, link: &'a LinkLatencies, colour: RGBColor| {
         let of = (kind.of)(link);
-        Entry { key: Key::new(label, colour, Swatch::Line), counts: of.columns(lo, hi, COLUMNS), marks: Some(of) }
+        Entry { key: Key::new(label, colour, Swatch::Line), counts: of.columns(grid), marks: Some(of) }
     };
     if links.len() <= MAX_LINKS {
         let one = |(index, link): (usize, &&'a LinkLatencies)| entry(name(link), link, series(index).0);
         return links.iter().enumerate().map(one).collect();
     }
-    let mut sum = vec![0.0; COLUMNS];
+    let mut sum = Vec::new();
     for link in links {
-        let counts = (kind.of)(link).columns(lo, hi, COLUMNS);
+        let counts = (kind.of)(link).columns(grid);
+        sum.resize(counts.len(), 0.0);
         sum.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
     }
     let all = Key::new(format!("all {} links", links.len()), GREY, Swatch::Line);
     let mut entries = vec![Entry { key: all, counts: sum, marks: None }];
+    let best = links.iter().copied().reduce(|a, b| if (kind.of)(b).top() < (kind.of)(a).top() { b } else { a });
+    entries.extend(best.map(|link| entry(format!("smallest: {}", name(link)), link, BLUE)));
     let worst = links.iter().copied().reduce(|a, b| if (kind.of)(b).top() > (kind.of)(a).top() { b } else { a });
     entries.extend(worst.map(|link| entry(format!("largest: {}", name(link)), link, VERMILION)));
     entries
+}
+
+/// To the nanosecond as far as a column has room.
+fn exact(value: f64) -> String {
+    let decimals = match value.abs() {
+        v if v >= 10_000.0 => 1,
+        v if v >= 1_000.0 => 2,
+        _ => 3,
+    };
+    plain(value, decimals)
 }
 
 /// The legend with the percentiles of each entry.
@@ -130,8 +141,7 @@ fn table(canvas: &mut Canvas<'_>, area: Area, entries: &[Entry<'_>]) {
         swatch(canvas, (area.left + 10, y), &entry.key);
         canvas.text((area.left + 44, y), &fit(&entry.key.label, 12, NAMES - 48), Font::new(12));
         for (index, (_, value)) in entry.marks.iter().flat_map(|of| of.marks.iter()).enumerate() {
-            let text = short(*value);
-            debug_assert!(text_width(&text, 12) < column || header.marks.len() > 6, "{text} is too wide");
+            let text = exact(*value);
             canvas.text((right(index), y), &fit(&text, 12, column - 6), Font::new(12).right());
         }
     }

@@ -3,7 +3,10 @@
 use super::Material;
 use super::buckets::{Buckets, Envelope};
 use super::chart::{Axis, Chart, short};
-use super::look::{Area, BLUE, Canvas, Font, Key, Swatch, VERMILION, Words, empty_page, legend, page, spread};
+use super::distribution::Grid;
+use super::look::{
+    Area, BLUE, Canvas, Font, Key, Swatch, VERMILION, Words, counted as plural, empty_page, legend, page, spread,
+};
 use crate::study::row::CycleRow;
 use crate::time::Span;
 
@@ -37,7 +40,10 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let shown = if each == 1 { "every cycle".to_owned() } else { format!("smallest and largest of {each} cycles") };
     let words = Words {
         title: "T_DP deviation: length of each cycle minus the nominal T_DP",
-        subtitle: format!("left: over time, {shown}; right: histogram of {} cycles, same axis.", counted.count),
+        subtitle: format!(
+            "left: over time, {shown}; right: histogram of {}, same axis.",
+            plural(counted.count, "cycle")
+        ),
         plotted: "deviation of each cycle's length, over time and histogram",
     };
     if over_time.is_empty() {
@@ -65,7 +71,12 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
         let end = points.last().map_or(cycle, |point| point.0 + cycle * each as f64);
         let x = Axis::linear(format!("time [{unit}]"), 0.0, end);
         let chart = Chart::draw(canvas, Area { right: split, ..area }, x, y.clone());
-        chart.band(canvas, &points, cycle * each as f64, BLUE, 0.6);
+        if each == 1 {
+            let line: Vec<(i32, i32)> = points.iter().map(|point| chart.at(point.0, point.1)).collect();
+            canvas.path(&line, BLUE, 1);
+        } else {
+            chart.band(canvas, &points, cycle * each as f64, BLUE, 0.6);
+        }
         histogram(canvas, Area { left: split, right: area.right - LABELS, ..area }, y, material);
     })
 }
@@ -73,18 +84,18 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
 /// Level columns on the same axis, with marks at the right.
 fn histogram(canvas: &mut Canvas<'_>, outer: Area, y: Axis, material: &Material<'_>) {
     let counted = &material.distributions.t_dp_deviation;
-    let (lo, hi) = (y.lo, y.hi);
-    let counts = counted.columns(lo, hi, COLUMNS);
+    let grid = Grid::over(std::iter::once(counted), COLUMNS);
+    let counts = grid.as_ref().map_or_else(Vec::new, |grid| counted.columns(grid));
     let most = counts.iter().copied().fold(0.0, f64::max);
     let chart = Chart::draw(canvas, outer, Axis::counts("cycles (logarithmic)", most), y);
-    let width = (hi - lo) / COLUMNS as f64;
-    for (index, &count) in counts.iter().enumerate().filter(|column| *column.1 > 0.0) {
-        let low = lo + index as f64 * width;
-        let right = chart.x(count).max(chart.area.left + 1);
-        let bar = Area { left: chart.area.left, top: chart.y(low + width), right, bottom: chart.y(low) };
-        canvas.fill(bar, BLUE);
+    if let Some(grid) = grid {
+        for (index, &count) in counts.iter().enumerate().filter(|column| *column.1 > 0.0) {
+            let (left, right) = (chart.area.left, chart.x(count).max(chart.area.left + 1));
+            let (top, bottom) = (chart.y(grid.left(index + 1)), chart.y(grid.left(index)));
+            canvas.fill(Area { left, top, right, bottom }, BLUE);
+        }
     }
-    let mut marks: Vec<&(String, f64)> = counted.marks.iter().collect();
+    let mut marks: Vec<&(String, f64)> = counted.marks.iter().rev().collect();
     marks.sort_by(|a, b| b.1.total_cmp(&a.1));
     let wanted: Vec<(i32, i32)> = marks.iter().map(|mark| (chart.y(mark.1), 18)).collect();
     let places = spread(&wanted, chart.area.top - 8, chart.area.bottom + 30);

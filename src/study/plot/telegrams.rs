@@ -100,12 +100,14 @@ pub struct BusCycle {
     kept: Cycle,
     /// What the last request was for, and for whom.
     asked: (Kind, Option<Address>),
+    /// SYNCH, told of ahead of its start: it belongs to the cycle that its last bit begins.
+    coming: Option<Bar>,
 }
 
 impl BusCycle {
     /// Nothing kept yet.
     pub fn new() -> Self {
-        Self { current: Cycle::new(), kept: Cycle::new(), asked: (Kind::Unreadable, None) }
+        Self { current: Cycle::new(), kept: Cycle::new(), asked: (Kind::Unreadable, None), coming: None }
     }
 
     /// The kept cycle.
@@ -165,10 +167,12 @@ impl Default for BusCycle {
 impl Recorder for BusCycle {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
         let (kind, asks, slave) = self.classify(telegram);
+        let bar = Bar { start: telegram.start, end: telegram.end, kind, asks, slave };
         if kind == Kind::Synch {
-            self.next(telegram.start, telegram.end);
+            self.coming = Some(bar);
+        } else {
+            self.current.push(bar);
         }
-        self.current.push(Bar { start: telegram.start, end: telegram.end, kind, asks, slave });
     }
 
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
@@ -176,8 +180,10 @@ impl Recorder for BusCycle {
         match what {
             Observation::CycleStart { cycle, .. } => {
                 // Without its SYNCH on the line the cycle begins all the same.
-                if self.current.t0 != Some(stamp.at) {
-                    self.next(stamp.at, stamp.at);
+                let synch = self.coming.take();
+                self.next(synch.map_or(stamp.at, |synch| synch.start), stamp.at);
+                if let Some(synch) = synch {
+                    self.current.push(synch);
                 }
                 self.current.number = Some(*cycle);
             }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::look::{WIDTH, text_width};
 use super::*;
-use crate::observation::{Disturbance, Inputs, Observation, Phase, PllState, SlaveCause, SlaveState};
+use crate::observation::{Disturbance, Inputs, Leds, Observation, Phase, PllState, SlaveCause, SlaveState};
 use crate::sim::crystal::Crystal;
 use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::time::{BitRate, Local, Time};
@@ -106,14 +106,13 @@ impl World {
         let fault = index == 1 && (700..760).contains(&cycle);
         let (phase, pll) = match (age, fault) {
             (None, _) => (Phase::Configuration, PllState::Idle),
-            (_, true) => (Phase::Clock, PllState::Narrowing),
-            (Some(0..=27), _) => (Phase::Clock, PllState::Narrowing),
+            (_, true) | (Some(0..=27), _) => (Phase::Clock, PllState::Narrowing),
             (Some(28..=45), _) => (Phase::MasterLife, PllState::Locked),
             (Some(46..=63), _) => (Phase::SlaveLife, PllState::Locked),
             _ => (Phase::Operation, PllState::Locked),
         };
         let settled = (16_000 >> (age.unwrap_or(0) / 2).min(12)) * 12;
-        let sign = if index % 2 == 0 { 1 } else { -1 };
+        let sign = if index.is_multiple_of(2) { 1 } else { -1 };
         let error = sign * settled + self.noise(15 * 12);
         let window = (4_000i64 >> (age.unwrap_or(0) / 4).min(8)).max(1_000) * 12;
         self.plots.slave(&SlaveRow {
@@ -123,6 +122,7 @@ impl World {
             state: SlaveState::DataExch,
             phase,
             pll,
+            leds: if fault { Leds::NotAddressed } else { Leds::DataExchange },
             pll_error: age.filter(|&age| age > 0).map(|_| Span::from_ticks(error)),
             period: None,
             window: age.map(|_| Span::from_ticks(window)),
@@ -352,7 +352,10 @@ const WORDS: [(&str, &[&str]); 7] = [
     ("latch_skew.svg", &["Latch skew:", "latch skew [ns]", "cycles (logarithmic)", "p99.9 ", "cycles per column"]),
     ("pll_convergence.svg", &["PLL convergence:", "error and window [ns]", "cycles since", "± window", "locked at"]),
     ("t_dp_deviation.svg", &["T_DP deviation:", "T_DP deviation [ns]", "time [", "cycles (logarithmic)", "p99 "]),
-    ("timeline.svg", &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "telegram lost", "slave 3"]),
+    (
+        "timeline.svg",
+        &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "telegram disturbed", "slave 3", "LED flashing"],
+    ),
     ("publish_latency.svg", &["Publish latency:", "latency [us]", "Wire:", "Publish:", "Age at use:", "p99.9"]),
     ("bus_cycle.svg", &["Bus cycle:", "time from t0 [us]", "T_DP ", "T_O ", "T_I ", "T_DX ", "spare ", "SYNCH", "DXB"]),
     ("position.svg", &["Position:", "G1_XIST1 [steps]", "time ["]),

@@ -7,10 +7,11 @@ use super::buckets::{Buckets, Merge};
 use super::chart::{Axis, Ruler};
 use super::lanes::Lanes;
 use super::look::{
-    Area, BLACK, BLUE, Canvas, FAINT, Font, GREEN, GREY, INK, Key, ORANGE, PURPLE, SKY, Swatch, VERMILION, WIDTH,
-    Words, empty_page, legend, legend_height, page,
+    Area, BLACK, BLUE, Canvas, FAINT, Font, GREEN, GREY, INK, Key, Lit, ORANGE, PURPLE, SKY, Swatch, VERMILION, WHITE,
+    WIDTH, Words, counted, empty_page, lamp, legend, legend_height, page,
 };
-use crate::observation::{Observation, Phase, SlaveState};
+use crate::device::leds::Lamp;
+use crate::observation::{Leds, Observation, Phase, SlaveState};
 use crate::study::row::{EventRow, SlaveRow};
 
 /// Buckets of the whole run.
@@ -47,8 +48,9 @@ const MARKS: [Mark; 5] = [
     Mark { label: "left DATA_EXCH (upper half)", column: "left", colour: PURPLE, from: 0, to: 1 },
     Mark { label: "fault acknowledged (lower half)", column: "ack", colour: GREEN, from: 1, to: 2 },
 ];
-/// What disturbs the bus, one lane each.
-const TROUBLES: [&str; 4] = ["telegram lost", "collision", "SYNCH late", "no answer"];
+/// What disturbs the network, one lane each.
+const TROUBLES: [&str; 6] =
+    ["telegram disturbed", "collision", "SYNCH late", "no answer", "sign of life held", "supply off"];
 
 /// Colour and name of each phase.
 const PHASES: [(Phase, RGBColor); 5] = [
@@ -59,9 +61,16 @@ const PHASES: [(Phase, RGBColor); 5] = [
     (Phase::Operation, RGBColor(0xCF, 0xEB, 0xDD)),
 ];
 
+/// A lamp: what a pattern makes it do, and its colour.
+type Light = (fn(Leds) -> Lamp, RGBColor);
+/// The red LED, the upper strip, and the green one, the lower (manual 5.2).
+const LAMPS: [Light; 2] = [(Leds::red, VERMILION), (Leds::green, GREEN)];
+
 /// One piece of time of one slave.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
+    /// The lowest pattern of the LEDs, by its number in the manual.
+    leds: Option<Leds>,
     /// The lowest phase.
     phase: Option<Phase>,
     /// Bit per entry of `MARKS` or `TROUBLES`.
@@ -74,11 +83,17 @@ impl Cell {
     fn phase(&mut self, phase: Phase) {
         self.phase = Some(self.phase.map_or(phase, |before| before.min(phase)));
     }
+    fn leds(&mut self, leds: Leds) {
+        self.leds = Some(self.leds.map_or(leds, |before| before.min(leds)));
+    }
 }
 impl Merge for Cell {
     fn merge(&mut self, other: &Self) {
         if let Some(phase) = other.phase {
             self.phase(phase);
+        }
+        if let Some(leds) = other.leds {
+            self.leds(leds);
         }
         self.marks |= other.marks;
         self.counter = self.counter.max(other.counter);
@@ -90,12 +105,12 @@ impl Merge for Cell {
 struct Lane {
     whole: Buckets<Cell>,
     start: Buckets<Cell>,
-    totals: [u32; 5],
+    totals: [u32; TROUBLES.len()],
 }
 
 impl Lane {
     fn new() -> Self {
-        Self { whole: Buckets::new(WHOLE), start: Buckets::new(START as usize), totals: [0; 5] }
+        Self { whole: Buckets::new(WHOLE), start: Buckets::new(START as usize), totals: [0; TROUBLES.len()] }
     }
     fn each(&mut self, cycle: u64, change: impl Fn(&mut Cell)) {
         change(self.whole.at(cycle));
@@ -127,6 +142,7 @@ impl Timeline {
         let counter = row.life_counter.max(row.clock_counter);
         self.slaves[index].each(row.cycle, |cell| {
             cell.phase(row.phase);
+            cell.leds(row.leds);
             cell.counter = cell.counter.max(counter);
         });
     }
@@ -138,6 +154,8 @@ impl Timeline {
             Observation::Collision { .. } => Some(1),
             Observation::ClockLate { .. } => Some(2),
             Observation::NoAnswer { .. } => Some(3),
+            Observation::MasterLifeHeld { held: true, .. } => Some(4),
+            Observation::Power { on: false } => Some(5),
             _ => None,
         };
         if let Some(trouble) = trouble {
@@ -152,6 +170,8 @@ impl Timeline {
             Observation::SlaveState { from: SlaveState::DataExch, .. } => lane.mark(row.cycle, 3),
             Observation::Acknowledged { .. } => lane.mark(row.cycle, 4),
             Observation::Phase { to, .. } => lane.each(row.cycle, |cell| cell.phase(to)),
+            Observation::Leds { to, .. } => lane.each(row.cycle, |cell| cell.leds(to)),
+            Observation::Power { on: false } => lane.each(row.cycle, |cell| cell.leds(Leds::NoSupply)),
             _ => {}
         }
     }
@@ -164,12 +184,15 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let zoomed = cycles > START * 2;
     let split = if zoomed { format!("Left: the first {START} cycles; right: the whole run. ") } else { String::new() };
     let words = Words {
-        title: "Timeline: start-up phases, faults and disturbances of every slave",
+        title: "Timeline: start-up phases, faults, LEDs and disturbances of every slave",
         subtitle: format!(
-            "{slaves} slaves, {cycles} cycles. {split}Each piece of time shows its lowest phase; a mark is at least \
-             {MARK} pixels wide, and marks that meet stand side by side. Numbers at the right: totals of the run."
+            "{}, {}. {split}Each piece of time shows its lowest phase and, in the two strips below, the first pattern of \
+             the manual's table that the red and the green LED showed; a mark is at least {MARK} pixels wide, and \
+             marks that meet stand side by side. Numbers at the right: totals of the run.",
+            counted(slaves as u64, "slave"),
+            counted(cycles, "cycle"),
         ),
-        plotted: "phases, faults, acknowledgements and disturbances per slave",
+        plotted: "phases, faults, acknowledgements, LEDs and disturbances per slave",
     };
     if cycles == 0 || slaves == 0 {
         return empty_page(meta, &words, "Nothing happened: no cycle of any slave was recorded.");
@@ -210,12 +233,20 @@ fn keys(counter: Option<u16>) -> Vec<Key> {
     let phases =
         PHASES.iter().map(|(phase, colour)| Key::new(format!("phase {}", phase.text()), *colour, Swatch::Fill));
     let marks = MARKS.iter().map(|mark| Key::new(mark.label, mark.colour, Swatch::Fill));
-    let trouble = Key::new("disturbance of the bus", INK, Swatch::Fill);
+    let trouble = Key::new("disturbance of the network", INK, Swatch::Fill);
     let counter = counter.map(|top| {
         let label = format!("larger of the two failure counters, height of the lane = {top}");
         Key::new(label, GREY, Swatch::Line)
     });
-    phases.chain(marks).chain([trouble]).chain(counter).collect()
+    let lamps = [
+        ("red LED bright (upper strip)", VERMILION, Lit::Full),
+        ("green LED bright (lower strip)", GREEN, Lit::Full),
+        ("red LED flashing", VERMILION, Lit::Striped),
+        ("green LED flashing", GREEN, Lit::Striped),
+        ("LED dark", GREY, Lit::Dark),
+    ];
+    let lamps = lamps.map(|(label, colour, lit)| Key::new(label, colour, Swatch::Lamp(lit)));
+    phases.chain(marks).chain([trouble]).chain(counter).chain(lamps).collect()
 }
 
 /// The words beside the lanes.
@@ -284,14 +315,41 @@ impl Panel<'_> {
         }
         let lanes = Lanes::new(timeline.slaves.len(), self.lanes_top, self.area.left, self.area.right);
         let top = highest_counter(timeline);
-        for (index, lane) in timeline.slaves.iter().enumerate() {
+        for (index, slave) in timeline.slaves.iter().enumerate() {
             lanes.ground(canvas, index);
-            let (place, buckets) = (lanes.lane(index), self.buckets(lane));
+            let (lane, buckets) = (lanes.lane(index), self.buckets(slave));
+            let strip = lamp_height(lane.height());
+            let place = Area { bottom: lane.bottom - LAMPS.len() as i32 * strip - 1, ..lane };
             phases(canvas, place, buckets, x);
             if counters {
                 counter(canvas, place, buckets, top, x);
             }
             marks(canvas, place, buckets, x);
+            canvas.fill(Area { top: place.bottom, bottom: place.bottom + 1, ..lane }, WHITE);
+            lamps(canvas, Area { top: place.bottom + 1, ..lane }, buckets, x);
+        }
+    }
+}
+
+/// Height of the strip of one lamp in a lane of this height [px].
+fn lamp_height(lane: i32) -> i32 {
+    (lane / 8).clamp(2, 4)
+}
+
+fn lamps(canvas: &mut Canvas<'_>, place: Area, buckets: &Buckets<Cell>, x: impl Fn(u64) -> i32) {
+    let cells: Vec<(u64, Option<Leds>)> = buckets.iter().map(|(first, cell)| (first, cell.leds)).collect();
+    let each = place.height() / LAMPS.len() as i32;
+    for run in cells.chunk_by(|a, b| a.1 == b.1) {
+        let Some(leds) = run[0].1 else { continue };
+        let (left, right) = (x(run[0].0), x(run[run.len() - 1].0 + buckets.cycles_each()));
+        for (row, (of, colour)) in (0..).zip(LAMPS) {
+            let lit = match of(leds) {
+                Lamp::Dark => Lit::Dark,
+                Lamp::Bright => Lit::Full,
+                Lamp::Flashing => Lit::Striped,
+            };
+            let top = place.top + row * each;
+            lamp(canvas, Area { left, right, top, bottom: top + each }, lit, colour);
         }
     }
 }

@@ -6,7 +6,10 @@ use super::kinds::jitter_bound;
 use super::section::Reader;
 use super::tree::Place;
 use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Scenario, Slave, When};
+use crate::device::options::Resolution;
+use crate::sim::motion;
 use crate::sim::noise::GcJitter;
+use crate::study::build;
 use crate::study::plan::Plan;
 use crate::study::quantity;
 use crate::time::{BitRate, Span};
@@ -26,11 +29,13 @@ const STAGES: &[&[Rule]] = &[
     &[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length],
     &[isochronous_rate, bus_parameters, device_max_tsdr, own_t_sdr],
     &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
-    &[encoder_parameters],
-    &[t_i_grid, t_o_grid, t_i_minimum, t_o_minimum, t_o_maximum, window, delay],
+    &[encoder_parameters, resolution],
+    &[t_i_grid, t_o_grid, t_i_minimum, t_o_minimum, t_o_maximum, window, delay, least_window],
+    &[quantum],
     &[functions, code_sequence, units_per_rev, total_range, jitter_fits, cycles_fit],
     &[publishers, subscribers, samples, link_counts, link_watchdog],
     &[event_stations, event_instants, disturbance_stations],
+    &[start_up],
 ];
 
 /// Largest offset of a crystal. Model: twice what cheap ones have over temperature and age.
@@ -290,7 +295,7 @@ fn t_i_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn t_o_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let t_dx = facts.plan.t_dx;
+    let t_dx = facts.plan.t_dx_told();
     for slave in facts.scenario.configured() {
         let min = facts.plan.t_o_min(slave.device);
         if slave.times.t_o < min {
@@ -347,8 +352,39 @@ fn window(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn delay(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
-        let max = Span::from_iso_units(u32::from(u16::MAX));
-        iso_units(reader, slave, ("t_pll_d", slave.times.t_pll_d), Span::ZERO, max, "3.3.9");
+        // The delayed latch must lie before the next clock, which may come a window early.
+        let window = slave.times.t_pll_w.max(slave.options.pll.min_window);
+        let before_clock = (slave.times.t_i - window - Span::from_iso_units(1)).max(Span::ZERO);
+        let max = Span::from_iso_units(u32::from(u16::MAX)).min(before_clock);
+        iso_units(reader, slave, ("t_pll_d", slave.times.t_pll_d), Span::ZERO, max, "3.3.9, Model: D13");
+    }
+}
+
+/// The narrowest window is one that may be.
+fn least_window(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let widest = Span::from_ticks(facts.scenario.master.t_dp.ticks() / 4);
+    for slave in facts.scenario.configured() {
+        let least = slave.options.pll.min_window;
+        if least > widest {
+            let fault = Fault::new(format!("a window of {least} to either side would reach the next clock"))
+                .rule(format!("min_window <= T_DP / 4 = {widest} (Model: D12)"))
+                .help("the default is min_window = \"1 us\"");
+            about_slave(reader, slave, "pll.min_window", fault);
+        }
+    }
+}
+
+/// A timer whose steps are longer than the window cannot hit it.
+fn quantum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for slave in facts.scenario.configured() {
+        let (pll, quantum) = (slave.options.pll, slave.options.pll.quantum);
+        let window = slave.times.t_pll_w.max(pll.min_window);
+        if quantum > window {
+            let fault = Fault::new(format!("timer steps of {quantum} are longer than the window"))
+                .rule(format!("quantum <= half width of the window in force, {window} (manual 3.3.8, Model: D14)"))
+                .help("the default is quantum = \"250 tick\", 1/48 us");
+            about_slave(reader, slave, "pll.quantum", fault);
+        }
     }
 }
 
@@ -378,11 +414,24 @@ fn encoder_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
             ("scaling", slave.scaling.is_some()),
             ("functions", slave.functions),
             ("code_sequence", slave.code_sequence == CodeSequence::Ccw),
+            ("resolution", slave.options.resolution.is_some()),
+            ("preset_value", slave.options.preset_value != 0),
         ];
         if let Some((key, _)) = given.into_iter().find(|&(_, given)| given) {
             let fault = Fault::new(format!("{} has no {key}", slave.device.name))
-                .rule("scaling, preset and code sequence are parameters of encoders (manual 3.2)");
+                .rule("disc, scaling, preset and code sequence are an encoder's (manual 3.2)");
             about_slave(reader, slave, key, fault);
+        }
+    }
+}
+
+/// The positions of a disc fit into the words of telegram 81.
+fn resolution(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for slave in facts.scenario.configured() {
+        let Resolution { steps_per_rev, revolutions } = slave.resolution();
+        if let Err(error) = motion::Resolution::new(steps_per_rev, revolutions) {
+            let fault = Fault::new(error.to_string()).rule("G1_XIST1 and G1_XIST2 have 32 bits (manual 2.2)");
+            about_slave(reader, slave, "resolution", fault);
         }
     }
 }
@@ -411,7 +460,7 @@ fn code_sequence(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn units_per_rev(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
-        let (Some(scaling), steps) = (slave.scaling, slave.device.steps_per_rev) else { continue };
+        let (Some(scaling), steps) = (slave.scaling, slave.resolution().steps_per_rev) else { continue };
         if !(1..=steps).contains(&scaling.units_per_rev) {
             let fault = Fault::new(format!("{} units per revolution are out of range", scaling.units_per_rev))
                 .rule(format!("1 to {steps} units, the physical resolution of {} (manual 3.2.3)", slave.device.name))
@@ -424,7 +473,7 @@ fn units_per_rev(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 fn total_range(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
         let Some(scaling) = slave.scaling else { continue };
-        let revolutions = slave.device.revolutions;
+        let revolutions = slave.resolution().revolutions;
         let max = u64::from(scaling.units_per_rev) * u64::from(revolutions);
         if scaling.total_range == 0 || u64::from(scaling.total_range) > max {
             let fault = Fault::new(format!("a total range of {} is out of range", scaling.total_range))
@@ -440,7 +489,10 @@ fn total_range(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn jitter_fits(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let master = &facts.scenario.master;
+    let bus = &facts.scenario.bus.params;
     let spare = master.t_dp - facts.plan.content();
+    // Tokens in the spare time leave an idle line of T_ID1 alone.
+    let spare = if master.active_spare { spare.min(bus.span(bus.t_id1())) } else { spare };
     // A stray to the one side follows a stray to the other; accumulating, each one counts from the last.
     let times = if master.accumulate { 1 } else { 2 };
     let (stray, words) = match (jitter_bound(master.gc_jitter), master.gc_jitter) {
@@ -597,6 +649,23 @@ fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
                 about(reader, &format!("disturbance.{}.{key}", i + 1), &[], fault);
             }
         }
+    }
+}
+
+/// A slave that starts up, or comes back, does so while the others exchange data.
+fn start_up(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let (plan, t_dp) = (&facts.plan, facts.scenario.master.t_dp);
+    let needed = |slave| plan.start_up(facts.scenario, slave, build::set_prm(facts.scenario, slave).len());
+    let longest = facts.scenario.configured().map(|slave| (needed(slave), slave)).max_by_key(|&(needed, _)| needed);
+    if let Some((needed, slave)) = longest.filter(|&(needed, _)| needed > t_dp) {
+        let fault = Fault::new(format!("T_DP = {t_dp} leaves slave {} no time to start up", slave.address))
+            .rule(format!(
+                "T_DP >= {needed}: Data_Exchange with the others, its Set_Prm, token {} and Global_Control {} (manual \
+                 3.3.2: time reserved for acyclic services, Model: D6)",
+                plan.token, plan.synch
+            ))
+            .help(format!("the shortest is t_dp = \"{}\"", needed.ceil_to(slave.device.dp_grid())));
+        about(reader, "master.t_dp", &[], fault);
     }
 }
 

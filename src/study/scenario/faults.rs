@@ -366,7 +366,7 @@ fn t_i_and_t_o_that_do_not_work() {
 good.toml:16:7: slave.3.t_o: T_O = 500 us is too early for slave 3
   16 | t_o = "0.5 ms"
      |       ^^^^^^^^
-  rule: T_O > T_DX + T_O_MIN = 478.6 us + 125 us = 603.6 us (manual 3.3.6, Model: D3)
+  rule: T_O > T_DX + T_O_MIN = 478.667 us + 125 us = 603.667 us (manual 3.3.6, Model: D3)
   help: the earliest is t_o = "625 us"
 "#,
         ),
@@ -645,7 +645,7 @@ fn overrides_that_cannot_be() {
             "0.5 ms",
             r#"
 --set "master.t_o=0.5 ms": slave.3.t_o: T_O = 500 us is too early for slave 3
-  rule: T_O > T_DX + T_O_MIN = 478.6 us + 125 us = 603.6 us (manual 3.3.6, Model: D3)
+  rule: T_O > T_DX + T_O_MIN = 478.667 us + 125 us = 603.667 us (manual 3.3.6, Model: D3)
   help: the earliest is t_o = "625 us"
 "#,
         ),
@@ -661,6 +661,7 @@ fn overrides_that_cannot_be() {
             "2 ppm",
             r#"
 --set "slave.9.crystal=2 ppm": slave.9.crystal: no slave has the address "9"
+  help: the slaves are 3, 4, 5, 11
 "#,
         ),
         (
@@ -901,6 +902,9 @@ fn every_kind_can_be_read() {
         let value = match kind.name {
             "jump-life-sign" => "to = 9",
             "control-word" => "value = 0x2000",
+            "read-parameter" => "parameter = 979\nelements = 6",
+            "change-parameter" => "parameter = 918\nvalue = 7",
+            "set-prm" => "octets = [[24, 0x05], [16, 255]]\nlength = 58",
             _ => "",
         };
         let event = format!("at = \"1 s\"\ndo = \"{}\"\n{about}\n{value}\n\n[[disturbance]]", kind.name);
@@ -950,6 +954,11 @@ fn files_that_cannot_be_scenarios() {
             written("latin.toml", latin),
             "FOLDER/latin.toml: this file is no UTF-8 text: octet B5 in line 2\n  help: save it as UTF-8; a scenario is a \
              text file",
+        ),
+        (
+            written("...toml", GOOD.as_bytes()),
+            "FOLDER/...toml: this file has no name before its extension\n  rule: the results of NAME.toml go to a \
+             directory NAME\n  help: rename it",
         ),
     ] {
         assert_eq!(said(&path), expected);

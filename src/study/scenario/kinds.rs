@@ -3,7 +3,7 @@
 use super::error::Fault;
 use super::section::{Reader, Section, choice, instant, number, quantity};
 use super::tree::{Node, Value};
-use super::{Action, Bursts, Disturbance, Service};
+use super::{Action, Bursts, Disturbance, Format, Patch, Service, StartupTelegram};
 use crate::sim::motion::{Angle, Motion, Shaft};
 use crate::sim::noise::{GcJitter, KINDS as JITTERS};
 use crate::study::quantity::{angle, micro_rpm};
@@ -34,6 +34,14 @@ impl<T: 'static> Kind<T> {
         (kind.read)(section, reader)
     }
 }
+
+/// Formats of a value to be written.
+const FORMATS: &[(&str, Format)] = &[
+    ("unsigned8", Format::Unsigned8),
+    ("unsigned16", Format::Unsigned16),
+    ("unsigned32", Format::Unsigned32),
+    ("octets", Format::OctetString),
+];
 
 /// How shafts can move.
 pub const MOTIONS: &[Kind<Motion>] = &[
@@ -66,6 +74,26 @@ pub const ACTIONS: &[Kind<Action>] = &[
         read: jump_life_sign,
     },
     Kind { name: "control-word", what: "the master sends `value` as G1_STW from now on", read: control_word },
+    Kind {
+        name: "read-parameter",
+        what: "the master application reads `elements` of `parameter` from `subindex` on over the parameter channel",
+        read: read_parameter,
+    },
+    Kind {
+        name: "change-parameter",
+        what: "the master application tries to set `parameter` to `value` in `format`",
+        read: change_parameter,
+    },
+    Kind {
+        name: "set-prm",
+        what: "the master starts the slaves anew; Set_Prm has other `octets` and another `length`, or is good again",
+        read: |section, reader| startup(StartupTelegram::Prm, section, reader),
+    },
+    Kind {
+        name: "chk-cfg",
+        what: "the master starts the slaves anew; Chk_Cfg has other `octets` and another `length`, or is good again",
+        read: |section, reader| startup(StartupTelegram::Cfg, section, reader),
+    },
     Kind { name: "power-off", what: "the slaves lose their supply", read: |_, _| Some(Action::PowerOff) },
     Kind { name: "power-on", what: "the slaves get their supply back", read: |_, _| Some(Action::PowerOn) },
     Kind { name: "clear", what: "the master changes to Clear", read: |_, _| Some(Action::Clear) },
@@ -159,6 +187,42 @@ fn jump_life_sign(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<
 }
 fn control_word(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Action> {
     section.required(reader, "value", "0x2000", number(0..=u16::MAX)).map(|value| Action::ControlWord { value })
+}
+
+fn read_parameter(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Action> {
+    let parameter = section.required(reader, "parameter", "979", number(1..=u16::MAX))?;
+    let subindex = section.optional(reader, "subindex", number(0..=u16::MAX)).unwrap_or(0);
+    let elements = section.optional(reader, "elements", number(0..=u8::MAX)).unwrap_or(1);
+    Some(Action::ReadParameter { parameter, subindex, elements })
+}
+fn change_parameter(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Action> {
+    let parameter = section.required(reader, "parameter", "918", number(1..=u16::MAX))?;
+    let subindex = section.optional(reader, "subindex", number(0..=u16::MAX)).unwrap_or(0);
+    let format = section.optional(reader, "format", |node| choice(node, "format", FORMATS, |row| row.0));
+    let value = section.required(reader, "value", "7", number(0..=u32::MAX))?;
+    Some(Action::ChangeParameter { parameter, subindex, format: format.map_or(Format::Unsigned16, |row| row.1), value })
+}
+#[expect(clippy::unnecessary_wraps, reason = "the signature of all kinds")]
+fn startup(telegram: StartupTelegram, section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Action> {
+    let mut patch = section.optional(reader, "octets", octets).unwrap_or_default();
+    if let Some(length) = section.optional(reader, "length", number(0..=244u8)) {
+        patch.set_length(length);
+    }
+    Some(Action::Startup { telegram, patch })
+}
+/// Pairs of an octet's number, from 1, and its value.
+fn octets(node: &Node) -> Result<Patch, Fault> {
+    let wrong = || Fault::new("the octets are pairs of a number and a value, 8 at most").help("octets = [[24, 0x05]]");
+    let Value::List(pairs) = &node.value else { return Err(wrong()) };
+    let mut patch = Patch::default();
+    for pair in pairs {
+        let Value::List(pair) = &pair.value else { return Err(wrong()) };
+        let [octet, value] = pair.as_slice() else { return Err(wrong()) };
+        if !patch.set(number(1..=244u8)(octet)?, number(0..=u8::MAX)(value)?) {
+            return Err(wrong());
+        }
+    }
+    Ok(patch)
 }
 
 fn missing_clocks(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Disturbance> {

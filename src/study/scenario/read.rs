@@ -2,6 +2,7 @@
 
 use super::error::Fault;
 use super::kinds::{self, ACTIONS, DISTURBANCES, Kind, address};
+use super::options;
 use super::section::{Reader, Section, choice, cycle_time, instant, number, quantity, suggestion, text, yes};
 use super::tree::{Node, Place, Table, Value};
 use super::{
@@ -184,10 +185,15 @@ fn overrides(reader: &mut Reader<'_>, root: &mut Table, slaves: &mut [SlaveTable
         let path: Vec<&str> = set.path.iter().map(String::as_str).collect();
         let key = set.path.join(".");
         let result = match path[..] {
-            ["slave", station, ref rest @ ..] => match slaves.iter_mut().find(|s| s.address.to_string() == station) {
-                Some(slave) => put(&mut slave.table, rest, &set.node),
-                None => Err(Fault::new(format!("no slave has the address \"{station}\""))),
-            },
+            ["slave", station, ref rest @ ..] => {
+                if let Some(slave) = slaves.iter_mut().find(|slave| slave.address.to_string() == station) {
+                    put(&mut slave.table, rest, &set.node)
+                } else {
+                    let all: Vec<_> = slaves.iter().map(|slave| slave.address.to_string()).collect();
+                    let fault = Fault::new(format!("no slave has the address \"{station}\""));
+                    Err(fault.help(format!("the slaves are {}", all.join(", "))))
+                }
+            }
             [name, index, ref rest @ ..] if TABLES[SINGLE..].contains(&name) => match entry(root, name, index) {
                 Some(table) => put(table, rest, &set.node),
                 None => Err(Fault::new(format!("there is no [[{name}]] number \"{index}\"")).help("the first is 1")),
@@ -312,6 +318,8 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
     let (gc_jitter, accumulate) =
         jitter.and_then(|inner| kinds::gc_jitter(inner, reader)).unwrap_or((GcJitter::None, false));
     let life_start = s.optional(reader, "life_start", number(1..=15)).unwrap_or(1);
+    let life_delay = s.optional(reader, "life_delay", number(0..=u32::MAX)).unwrap_or(0);
+    let active_spare = s.optional(reader, "active_spare", yes).unwrap_or(false);
     section.finish(reader);
     let (address, t_dp) = (address?, t_dp?);
     let master = Master {
@@ -328,6 +336,8 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
         gc_jitter,
         accumulate,
         life_start,
+        life_delay,
+        active_spare,
     };
     Some((master, times))
 }
@@ -420,7 +430,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
         None => standstill,
     };
     let max_life_failures = s.optional(reader, "max_life_failures", number(0..=u8::MAX)).unwrap_or(1);
-    let clock_tolerance = s.optional(reader, "clock_tolerance", number(0..=u8::MAX)).unwrap_or(1);
+    let options = options::read(s, reader, rate);
     let code_sequence = s.optional(reader, "code_sequence", code_sequence).unwrap_or(CodeSequence::Cw);
     let inner = s.table(reader, "scaling");
     let scaling = inner.and_then(|inner| scaling(inner, reader));
@@ -441,12 +451,12 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
         times: times?,
         motion,
         max_life_failures,
-        clock_tolerance,
         code_sequence,
         functions,
         scaling,
         silent,
         powered_at,
+        options,
     })
 }
 

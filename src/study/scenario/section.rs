@@ -164,7 +164,7 @@ fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<Strin
 }
 
 /// "did you mean ..." if one of `known` is near `word`, otherwise all of them.
-pub(super) fn suggestion<'k>(word: &str, known: impl Iterator<Item = &'k str> + Clone) -> String {
+pub(in crate::study) fn suggestion<'k>(word: &str, known: impl Iterator<Item = &'k str> + Clone) -> String {
     nearest(word, known.clone()).unwrap_or_else(|| format!("known here: {}", known.collect::<Vec<_>>().join(", ")))
 }
 

@@ -1,0 +1,146 @@
+//! The master's side of the PROFIdrive parameter channel: a request is written to record 47, its answer is read from
+//! there (manual 4, PROFIdrive base mode).
+//!
+//! | stage | answer | next |
+//! |---|---|---|
+//! | Written | positive | Reading |
+//! | Reading | positive | values and errors are told; the next request |
+//! | Reading | state conflict: not ready yet | Reading |
+//! | any | anything else | the failure is told; the next request |
+
+use alloc::collections::VecDeque;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::dp::ms1::{Failure, Job, MAX_PDU};
+use crate::fdl::Outbox;
+use crate::observation::{AcyclicFailure, Observation};
+use crate::wire::Address;
+use crate::wire::acyclic::{ErrorCode, Record, Request, Response};
+use crate::wire::parameter::{self, Format, ParameterAddress, RequestId, ResponseId, Values};
+
+/// The record of the parameter channel; telegram 81 sits in slot 1 (manual 6.3).
+const CHANNEL: Record = Record { slot: 1, index: Record::PARAMETER_CHANNEL };
+/// Octets of the longest answer that is asked for.
+const MAX_ANSWER: u8 = 240;
+
+/// A request and the slave it is for.
+#[derive(Clone, Debug)]
+struct Asked {
+    slave: usize,
+    address: Address,
+    parameter: ParameterAddress,
+    change: Option<(Format, u32)>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Stage {
+    /// The request is to be written.
+    Written,
+    /// The answer is to be read.
+    Reading,
+}
+
+/// Requests of the master application, one after the other.
+#[derive(Clone, Debug, Default)]
+pub struct ParameterClient {
+    waiting: VecDeque<Asked>,
+    running: Option<(Asked, Stage)>,
+    reference: u8,
+}
+
+impl ParameterClient {
+    /// Asks a slave (its index and address) for a parameter, or to change it.
+    pub fn ask(
+        &mut self,
+        (slave, address): (usize, Address),
+        parameter: ParameterAddress,
+        change: Option<(Format, u32)>,
+        out: &mut Outbox,
+    ) {
+        let ParameterAddress { pnu, subindex, elements, .. } = parameter;
+        let request =
+            Observation::ParameterRequest { slave: address, pnu, subindex, elements, change: change.is_some() };
+        out.observe(request);
+        self.waiting.push_back(Asked { slave, address, parameter, change });
+    }
+
+    /// The next job for the slave, if there is something to do.
+    pub fn job(&mut self) -> Option<Job> {
+        if self.running.is_none() {
+            self.running = Some((self.waiting.pop_front()?, Stage::Written));
+            self.reference = if self.reference == u8::MAX { 1 } else { self.reference + 1 };
+        }
+        let (asked, stage) = self.running.as_ref()?;
+        let pdu = match stage {
+            Stage::Written => self.write(asked),
+            Stage::Reading => emit(&Request::Read { record: CHANNEL, len: MAX_ANSWER }),
+        };
+        Some(Job { slave: asked.slave, pdu })
+    }
+    fn write(&self, asked: &Asked) -> Vec<u8> {
+        let mut data = [0; MAX_ANSWER as usize];
+        let id = if asked.change.is_some() { RequestId::Change } else { RequestId::Read };
+        let octets = asked.change.map(|(format, value)| (format, value.to_be_bytes()));
+        let value = octets.as_ref().map(|(format, octets)| {
+            let from = octets.len() - format.size().min(octets.len());
+            Values { format: *format, data: &octets[from..] }
+        });
+        let head = (self.reference, id, 0);
+        let len = parameter::emit_request(head, &[asked.parameter], value.as_slice(), &mut data).unwrap_or(0);
+        emit(&Request::Write { record: CHANNEL, data: &data[..len] })
+    }
+
+    /// Takes what became of the job.
+    pub fn answered(&mut self, answer: Result<&[u8], Failure>, out: &mut Outbox) {
+        let Some((asked, stage)) = self.running.take() else { return };
+        let failed = |why| Observation::AcyclicFailed { slave: asked.address, why };
+        let response = match answer {
+            Ok(pdu) => Response::parse(pdu),
+            Err(Failure::Closed) => return out.observe(failed(AcyclicFailure::Closed)),
+            Err(Failure::Timeout) => return out.observe(failed(AcyclicFailure::Timeout)),
+            Err(Failure::Left) => return out.observe(failed(AcyclicFailure::Left)),
+        };
+        match (stage, response) {
+            (Stage::Written, Ok(Response::Write { .. })) => self.running = Some((asked, Stage::Reading)),
+            (Stage::Reading, Ok(Response::Negative(negative))) if negative.code_1 == ErrorCode::STATE_CONFLICT => {
+                self.running = Some((asked, Stage::Reading));
+            }
+            (Stage::Reading, Ok(Response::Read { data, .. })) => tell(&asked, data, out),
+            (_, Ok(Response::Negative(negative))) => out.observe(failed(AcyclicFailure::Refused(negative.code_1))),
+            _ => out.observe(failed(AcyclicFailure::Unreadable)),
+        }
+    }
+}
+
+/// Tells the values of an answer, or its errors.
+fn tell(asked: &Asked, data: &[u8], out: &mut Outbox) {
+    let slave = asked.address;
+    let ParameterAddress { pnu, subindex, .. } = asked.parameter;
+    let Ok(response) = parameter::Response::parse(data) else {
+        return out.observe(Observation::AcyclicFailed { slave, why: AcyclicFailure::Unreadable });
+    };
+    if let (ResponseId::Changed, Some((_, value))) = (response.id, asked.change) {
+        out.observe(Observation::ParameterValue { slave, pnu, subindex, value });
+    }
+    for values in response.values() {
+        if let Some(number) = values.error_number() {
+            out.observe(Observation::ParameterError { slave, pnu, subindex, number });
+            continue;
+        }
+        for at in 0..values.count() {
+            // P965 is a string whose octets are elements.
+            let octet = values.data.get(at).filter(|_| values.format == Format::OctetString);
+            if let Some(value) = values.unsigned(at).or(octet.map(|&octet| octet.into())) {
+                out.observe(Observation::ParameterValue { slave, pnu, subindex: subindex + at as u16, value });
+            }
+        }
+    }
+}
+
+fn emit(request: &Request<'_>) -> Vec<u8> {
+    let mut pdu = vec![0; MAX_PDU];
+    let len = request.emit(&mut pdu).unwrap_or(0);
+    pdu.truncate(len);
+    pdu
+}

@@ -1,0 +1,64 @@
+//! Once a network runs, a cycle allocates nothing: neither the stations nor the kernel nor what is recorded.
+//!
+//! A test binary of its own, because the counter takes the place of the allocator.
+
+use std::path::Path;
+
+use isodp::device::node::Node;
+use isodp::sim::fingerprint::Fingerprints;
+use isodp::sim::network::{Network, NetworkEvent, Until};
+use isodp::sim::queue::{HeapQueue, NearQueue, Queue};
+use isodp::study::build;
+use isodp::study::histogram::Histograms;
+use isodp::study::metric::Metrics;
+use isodp::study::run;
+use isodp::study::scenario::Scenario;
+
+/// Cycles until everything is locked, linked and polled once: queues and buffers have their final size.
+const START: u64 = 1_000;
+/// Cycles that are watched.
+const WATCHED: u64 = 1_000;
+
+fn reference(sets: &[(&str, &str)]) -> Scenario {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/reference.toml");
+    let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
+    Scenario::load(&path, &sets).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Allocations of the watched cycles, with metrics, histograms and fingerprints.
+fn allocations<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> u64 {
+    let layout = run::layout(scenario);
+    let histograms = Histograms::new(&layout);
+    let mut recorder = (Fingerprints::default(), Metrics::new(layout, |_, _| 0.0, histograms));
+    let mut network: Network<Node, Q> = build::network(scenario);
+    assert!(network.run(Until::Cycle(START), u64::MAX, &mut recorder));
+    let info = allocation_counter::measure(|| {
+        assert!(network.run(Until::Cycle(START + WATCHED), u64::MAX, &mut recorder));
+    });
+    assert!(network.cycles() > START + WATCHED, "the network stands still");
+    info.count_total
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(allocation_counter::measure(|| drop(std::hint::black_box(Box::new(1)))).count_total, 1);
+}
+
+#[test]
+fn a_running_network_allocates_nothing() {
+    let scenario = reference(&[]);
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&scenario), 0);
+    assert_eq!(allocations::<HeapQueue<NetworkEvent>>(&scenario), 0);
+}
+
+#[test]
+fn a_fault_and_its_acknowledgement_allocate_nothing() {
+    let scenario = reference(&[]);
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/reference.toml"));
+    let text = text.expect("a scenario")
+        + "\n[[disturbance]]\nkind = \"missing-clocks\"\nfrom_cycle = 500\ncount = 3\nevery = 200\n\
+           [[event]]\ncycle = 1200\ndo = \"acknowledge\"\nslaves = \"all\"\n\
+           [[disturbance]]\nkind = \"lost-telegrams\"\nfrom = 4\nfrom_cycle = 300\nevery = 50\n";
+    let disturbed = Scenario::parse(&scenario.name, "disturbed", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
+}
