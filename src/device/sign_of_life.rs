@@ -591,7 +591,7 @@ mod tests {
     fn the_monitor_agrees_with_a_decision_from_the_whole_history() {
         let mut random = Lcg(20_070_101);
         let mut reached = [0u32; 5];
-        for round in 0..200_000 {
+        for round in 0..2_000_000u32 {
             let hold = if round % 4 == 0 { 1 + random.below(14) as u8 } else { 1 + random.below(3) as u8 };
             let tolerance = random.below(5) as u16;
             let length = 1 + random.below(if round % 50 == 0 { 700 } else { 130 }) as usize;
