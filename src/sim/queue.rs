@@ -5,7 +5,7 @@
 
 use crate::time::Time;
 use core::fmt;
-use std::collections::{BinaryHeap, VecDeque};
+use std::collections::BinaryHeap;
 
 /// What kind of event comes first among events of one instant.
 ///
@@ -45,7 +45,7 @@ impl Key {
     /// Turns the order of signed times into that of unsigned bits.
     const SIGN: u64 = 1 << 63;
 
-    /// The place of `station`'s event `number` at `time`. Together with the station the number is given out once.
+    /// The place of `station`'s event `number` at `time`. Together with phase and station the number is given out once.
     ///
     /// # Panics
     /// If `number` is beyond [`Self::MAX_NUMBER`].
@@ -89,7 +89,7 @@ pub trait Queue<E: Copy>: Default {
     /// If it is earlier than the one before: somebody pushed an event into the past.
     fn pop(&mut self) -> Option<(Key, E)>;
     /// The first event's key.
-    fn peek(&self) -> Option<&Key>;
+    fn peek(&mut self) -> Option<Key>;
     /// How many events wait.
     fn len(&self) -> usize;
     /// Whether no event waits.
@@ -163,76 +163,185 @@ impl<E: Copy> Queue<E> for HeapQueue<E> {
         self.watch.pass(key);
         Some((key, event))
     }
-    fn peek(&self) -> Option<&Key> {
-        self.heap.peek().map(|waiting| &waiting.key)
+    fn peek(&mut self) -> Option<Key> {
+        self.heap.peek().map(|waiting| waiting.key)
     }
     fn len(&self) -> usize {
         self.heap.len()
     }
 }
 
-/// The fast queue: a sorted ring, searched from its late end, behind a slot for the very next event.
+/// The fast queue: a calendar.
 ///
-/// Most events of a bus cycle come next as soon as they are pushed (a request, its answer, its echo): they pass through
-/// the slot and never see the ring. Most others come after all that wait: they end the ring. What falls between is
-/// found by a few steps from the late end, then by halving, and moves the shorter side of the ring.
+/// Today's events are sorted. Most events of a bus cycle come next as soon as they are pushed (a request, its answer, its
+/// echo): they end the list of today and leave it at once. Events of another day of the coming year are noted on the
+/// page of that day, in no order, and sorted when the day has come. The few that are later still wait in a heap.
 #[derive(Clone, Debug)]
 pub struct NearQueue<E> {
-    /// Earlier than the whole ring, if there is one.
-    slot: Option<(Key, E)>,
-    /// Ascending.
-    ring: VecDeque<(Key, E)>,
+    /// Events of `date` and of days before it, descending: the next one is the last.
+    today: Vec<(Key, E)>,
+    /// Day up to which `today` has everything.
+    date: i64,
+    /// Pages of the coming year: for each day, modulo the year, its first note.
+    pages: Vec<Option<NoteId>>,
+    /// The pages that have notes, as bits.
+    marked: [u64; YEAR / 64],
+    notes: Vec<Note<E>>,
+    /// First of the notes that can be written over.
+    blank: Option<NoteId>,
+    /// Notes on all pages.
+    noted: usize,
+    /// Events beyond the year.
+    later: BinaryHeap<Waiting<E>>,
     watch: Watch,
+}
+
+/// Bits of a tick's number within its day: a day is 0.35 ms.
+const DAY_BITS: u32 = 22;
+/// Days in a year: 45 ms, more than the longest T_DP.
+const YEAR: usize = 128;
+
+/// An event on a page.
+#[derive(Clone, Copy, Debug)]
+struct Note<E> {
+    key: Key,
+    event: E,
+    /// The next note of the page, or the next blank one.
+    next: Option<NoteId>,
+}
+/// Names a note: its index and one.
+type NoteId = core::num::NonZeroU32;
+
+/// The day of an event.
+const fn day(key: Key) -> i64 {
+    key.time().ticks() >> DAY_BITS
+}
+/// The page of a day.
+const fn page(day: i64) -> usize {
+    day as usize % YEAR
 }
 
 impl<E: Copy> Default for NearQueue<E> {
     fn default() -> Self {
-        Self { slot: None, ring: VecDeque::with_capacity(ROOM), watch: Watch::default() }
+        Self {
+            today: Vec::with_capacity(ROOM),
+            date: 0,
+            pages: vec![None; YEAR],
+            marked: [0; YEAR / 64],
+            notes: Vec::with_capacity(ROOM),
+            blank: None,
+            noted: 0,
+            later: BinaryHeap::with_capacity(ROOM),
+            watch: Watch::default(),
+        }
     }
 }
 impl<E: Copy> NearQueue<E> {
-    /// Steps from the late end before the search halves.
+    /// Steps from the next event before the search halves.
     const STEPS: usize = 8;
 
-    /// Puts an event at its place in the ring.
+    /// Puts an event at its place in the list of today.
     fn insert(&mut self, key: Key, event: E) {
-        let len = self.ring.len();
+        let len = self.today.len();
         let mut place = len;
-        while place > 0 && key < self.ring[place - 1].0 {
+        while place > 0 && self.today[place - 1].0 < key {
             place -= 1;
             if len - place == Self::STEPS {
-                place = self.ring.partition_point(|&(waiting, _)| waiting < key);
+                place = self.today.partition_point(|&(waiting, _)| waiting > key);
                 break;
             }
         }
-        self.ring.insert(place, (key, event));
+        self.today.insert(place, (key, event));
+    }
+
+    /// Notes an event on the page of its day.
+    fn note(&mut self, key: Key, event: E) {
+        let page = page(day(key));
+        let note = Note { key, event, next: self.pages[page] };
+        let id = if let Some(id) = self.blank {
+            let blank = &mut self.notes[id.get() as usize - 1];
+            self.blank = blank.next;
+            *blank = note;
+            id
+        } else {
+            self.notes.push(note);
+            NoteId::new(self.notes.len() as u32).expect("not zero after a push")
+        };
+        self.pages[page] = Some(id);
+        self.marked[page / 64] |= 1 << (page % 64);
+        self.noted += 1;
+    }
+
+    /// The next day with a note.
+    fn next_noted(&self) -> Option<i64> {
+        if self.noted == 0 {
+            return None;
+        }
+        let first = page(self.date + 1);
+        // All words from that of the first page on, and its own again for the pages before it.
+        let ahead = (0..=self.marked.len()).find_map(|step| {
+            let word = (first / 64 + step) % self.marked.len();
+            let from = if step == 0 { u64::MAX << (first % 64) } else { u64::MAX };
+            let bits = self.marked[word] & from;
+            (bits != 0).then(|| (word * 64 + bits.trailing_zeros() as usize + YEAR - first) % YEAR)
+        })?;
+        Some(self.date + 1 + ahead as i64)
+    }
+
+    /// The list of today is empty: goes on to the next day that has something. Not before the next event is asked for,
+    /// because what is pushed until then may come earlier.
+    fn turn(&mut self) {
+        let noted = self.next_noted();
+        let later = self.later.peek().map(|waiting| day(waiting.key));
+        let Some(date) = noted.into_iter().chain(later).min() else { return };
+        self.date = date;
+        if noted == Some(date) {
+            self.take_page(page(date));
+        }
+        while self.later.peek().is_some_and(|waiting| day(waiting.key) == date) {
+            self.today.extend(self.later.pop().map(|Waiting { key, event }| (key, event)));
+        }
+        self.today.sort_unstable_by(|(a, _), (b, _)| b.cmp(a));
+    }
+    fn take_page(&mut self, page: usize) {
+        let mut next = self.pages[page].take();
+        self.marked[page / 64] &= !(1 << (page % 64));
+        while let Some(id) = next {
+            let note = &mut self.notes[id.get() as usize - 1];
+            self.today.push((note.key, note.event));
+            next = core::mem::replace(&mut note.next, self.blank);
+            self.blank = Some(id);
+            self.noted -= 1;
+        }
     }
 }
 impl<E: Copy> Queue<E> for NearQueue<E> {
     fn push(&mut self, key: Key, event: E) {
-        match self.slot {
-            Some((next, _)) if next < key => self.insert(key, event),
-            None if self.ring.front().is_some_and(|&(first, _)| first < key) => self.insert(key, event),
-            _ => {
-                if let Some(displaced) = self.slot.replace((key, event)) {
-                    self.ring.push_front(displaced);
-                }
-            }
+        let day = day(key);
+        if day <= self.date {
+            self.insert(key, event);
+        } else if day - self.date < YEAR as i64 {
+            self.note(key, event);
+        } else {
+            self.later.push(Waiting { key, event });
         }
     }
     fn pop(&mut self) -> Option<(Key, E)> {
-        let (key, event) = match self.slot.take() {
-            Some(next) => next,
-            None => self.ring.pop_front()?,
-        };
+        if self.today.is_empty() {
+            self.turn();
+        }
+        let (key, event) = self.today.pop()?;
         self.watch.pass(key);
         Some((key, event))
     }
-    fn peek(&self) -> Option<&Key> {
-        self.slot.as_ref().or_else(|| self.ring.front()).map(|(key, _)| key)
+    fn peek(&mut self) -> Option<Key> {
+        if self.today.is_empty() {
+            self.turn();
+        }
+        self.today.last().map(|&(key, _)| key)
     }
     fn len(&self) -> usize {
-        usize::from(self.slot.is_some()) + self.ring.len()
+        self.today.len() + self.noted + self.later.len()
     }
 }
 
@@ -303,7 +412,7 @@ mod tests {
         let pop = |queue: &mut Q, list: &mut Vec<(Key, u64)>| {
             list.sort_unstable_by_key(|&(key, _)| key);
             let first = (!list.is_empty()).then(|| list.remove(0));
-            assert_eq!(queue.peek(), first.as_ref().map(|(key, _)| key));
+            assert_eq!(queue.peek(), first.map(|(key, _)| key));
             assert_eq!(queue.pop(), first);
             assert_eq!((queue.len(), queue.is_empty()), (list.len(), list.is_empty()));
             first.map_or(0, |(key, _)| key.time().ticks())
@@ -326,7 +435,7 @@ mod tests {
     proptest! {
         #[test]
         fn both_queues_pop_in_the_order_of_the_keys(
-            script in prop::collection::vec((prop_oneof![0i64..4, 0i64..1_000], 0u8..5, 0u8..3, prop::bool::weighted(0.4)), 0..200),
+            script in prop::collection::vec((prop_oneof![0i64..4, 0i64..1_000, 0i64..1 << 23, 0i64..1 << 31], 0u8..5, 0u8..3, prop::bool::weighted(0.4)), 0..200),
         ) {
             follows::<NearQueue<u64>>(&script);
             follows::<HeapQueue<u64>>(&script);

@@ -70,7 +70,8 @@ fn user_block(slave: &Slave) -> UserPrm81 {
         options: EncoderOptions::default()
             .with(EncoderOptions::COUNTER_CLOCKWISE, slave.code_sequence == CodeSequence::Ccw)
             .with(EncoderOptions::ACTIVATE, slave.functions)
-            .with(EncoderOptions::SCALING, scaling.is_some()),
+            // Bit 3 is the default of the GSD; without bit 1 it does nothing (manual 3.2.2).
+            .with(EncoderOptions::SCALING, scaling.is_some() || !slave.functions),
         units_per_revolution: scaling.map_or(steps_per_rev, |scaling| scaling.units_per_rev),
         // Not in force without scaling.
         total_range: scaling.map_or(positions.min(u32::MAX.into()) as u32, |scaling| scaling.total_range),
@@ -246,89 +247,55 @@ fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Ac
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::profile;
-    use crate::fdl::params::BusParams;
-    use crate::observation::Observation;
-    use crate::sim::motion::Motion;
-    use crate::sim::network::Until;
-    use crate::sim::noise::GcJitter;
-    use crate::sim::queue::{HeapQueue, NearQueue};
-    use crate::sim::record::{Recorder, Stamp, Transmission};
-    use crate::study::scenario::*;
-    use crate::time::{BitRate, Tbit};
 
-    fn small() -> Scenario {
-        let slave = |n: u8, device: &str| Slave {
-            address: Address::new(n).unwrap(),
-            device: profile::find(device).unwrap(),
-            position_mm: u64::from(n) * 10_000,
-            crystal: scenario::Crystal::Within(50_000),
-            t_sdr: Tbit(30),
-            times: IsoTimes {
-                t_i: Span::from_us(125),
-                t_o: Span::from_us(1250),
-                t_pll_w: Span::from_us(1),
-                t_pll_d: Span::ZERO,
-            },
-            motion: Motion::Speed { start: crate::sim::motion::Angle::ZERO, micro_rpm: 1_500_000_000 },
-            max_life_failures: 1,
-            code_sequence: CodeSequence::Cw,
-            functions: false,
-            scaling: None,
-            silent: false,
-            powered_at: Span::ZERO,
-            options: crate::device::options::UnitOptions::default(),
-        };
-        let mut slaves: Vec<Slave> = (3..=10).map(|n| slave(n, "posital-ocd-dpb1b")).collect();
-        slaves.push(slave(11, "subscriber-drive"));
-        Scenario {
-            name: "small".into(),
-            question: String::new(),
-            run: Run { seed: 1, duration: Extent::Cycles(200) },
-            bus: Bus { params: BusParams::profile(BitRate::M12), cable_mm: 100_000 },
-            master: scenario::Master {
-                address: Address::new(2).unwrap(),
-                position_mm: 0,
-                crystal: scenario::Crystal::Offset(0),
-                t_dp: Span::from_ms(2),
-                t_mapc: 1,
-                watchdog: Watchdog::of(Span::from_ms(200)),
-                get_cfg: true,
-                dx_retries: 1,
-                lost_after: 10,
-                clear_for: 0,
-                gc_jitter: GcJitter::BoundedNormal { sigma: Span::from_ns(100), bound: Span::from_ns(400) },
-                accumulate: false,
-                life_start: 1,
-                life_delay: 0,
-                active_spare: false,
-            },
-            slaves,
-            links: vec![Link {
-                publisher: Address::new(3).unwrap(),
-                subscriber: Address::new(11).unwrap(),
-                offset: 4,
-                length: 4,
-            }],
-            events: vec![],
-            disturbances: vec![],
-            record: Record { files: false, plots: false, tables: vec![], rows: 1 },
-        }
+    /// Three encoders at 12 Mbit/s, T_DP 2 ms, T_I 125 us, T_O 375 us, watchdog 200 ms.
+    const THREE: &str = r#"
+        [run]
+        cycles = 1
+        [bus]
+        rate = "12 Mbit/s"
+        [master]
+        address = 2
+        t_dp = "2 ms"
+        t_i = "125 us"
+        t_o = "375 us"
+        watchdog = "200 ms"
+        [[slave]]
+        addresses = "6..8"
+        device = "simodrive-sensor-isochron"
+    "#;
+    const LINK: &str = r#"
+        [[slave]]
+        address = 9
+        device = "subscriber-drive"
+        [[link]]
+        publisher = 6
+        subscriber = 9
+    "#;
+
+    fn octets(text: &str) -> Vec<u8> {
+        text.split_whitespace().map(|octet| u8::from_str_radix(octet, 16).expect("an octet")).collect()
     }
 
-    struct Print;
-    impl Recorder for Print {
-        fn telegram(&mut self, t: &Transmission<'_>) {
-            println!("{:>14.3} us  {:>4} -> {:02X?}", t.start.since_zero().as_us(), t.sender, t.octets);
-        }
-        fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
-            println!("{:>14.3} us  {:>4}: {what}", stamp.at.since_zero().as_us(), stamp.station);
-        }
-    }
+    /// The worked telegram: T_DX is 2674 units of 1/12 us, the user block is the GSD's default.
     #[test]
-    fn smoke() {
-        let mut network: Network<Node, NearQueue<NetworkEvent>> = network(&small());
-        network.run(Until::Cycle(200), 1_000_000, &mut Print);
-        let _ = HeapQueue::<NetworkEvent>::default();
+    fn set_prm_is_the_telegram_of_a_configuration_tool() {
+        let three = Scenario::parse("three", "three.toml", THREE, &[]).expect("a good scenario");
+        let expected = octets(
+            "88 14 01 0B 80 F9 80 C0 00 18 \
+             15 81 00 00 08 00 00 20 00 02 00 00 00 01 00 00 00 00 00 00 00 \
+             1C 04 00 00 01 00 00 05 DC 00 10 01 00 00 05 DC 00 01 00 03 00 00 0A 72 00 0C 00 00",
+        );
+        assert_eq!(set_prm(&three, &three.slaves[0]), expected);
+    }
+
+    #[test]
+    fn a_publisher_waits_for_an_idle_line_and_a_subscriber_gets_its_links() {
+        let text = [THREE, LINK].concat().replace("375 us", "500 us");
+        let four = Scenario::parse("four", "four.toml", &text, &[]).expect("a good scenario");
+        let publisher = set_prm(&four, &four.slaves[0]);
+        assert_eq!((publisher[3], publisher[7]), (76, 0xE0), "min T_SDR is T_ID1, Publisher_Enable is set");
+        let subscriber = set_prm(&four, &four.slaves[3]);
+        assert_eq!(subscriber[10 + IsoM::LEN..], octets("09 03 00 00 01 06 0C 04 04"));
     }
 }
