@@ -147,9 +147,11 @@ fn assert_undisturbed(scenario: &Scenario, run: &Run) -> u64 {
 }
 
 /// Largest and smallest latch skew of settled cycles lie around the delay of the line between the first and the last
-/// slave, the common jitter of SYNCH away: each loop adds ±1.55 Q/2 and Q.
+/// encoder, the common jitter of SYNCH away: each loop adds ±1.55 Q/2 and Q.
 fn assert_skew(scenario: &Scenario, run: &Run) {
-    let (first, last) = (&scenario.slaves[0], &scenario.slaves[scenario.slaves.len() - 1]);
+    let mut encoders = scenario.slaves.iter().filter(|slave| !slave.device.subscriber);
+    let first = encoders.next().expect("an encoder");
+    let last = encoders.next_back().expect("another one");
     let line = t_td(scenario, first.address, last.address);
     let t_i = Span::from_ticks(first.times.t_i.ticks() / 10_000);
     let most = line + Span::from_ticks(QUANTUM.ticks() * 255 / 100) + t_i;

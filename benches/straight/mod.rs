@@ -25,7 +25,7 @@ use encoders::StartUp;
 use isodp::device::pll::{Pll, PllSettings};
 use isodp::device::position::{CodeSequence, Position};
 use isodp::device::sensor::{Faults, Sensor, SensorOptions, Xist1, Xist2};
-use isodp::device::sign_of_life::{Counter, LifeSign, Monitor, MonitorSettings};
+use isodp::device::sign_of_life::{Counter, Monitor, MonitorSettings};
 use isodp::dp::GLOBAL_CONTROL;
 use isodp::observation::ClockVerdict;
 use isodp::sim::bus::Place;
@@ -36,7 +36,7 @@ use isodp::study::histogram::{Histogram, Quantity};
 use isodp::study::scenario::{self, Scenario};
 use isodp::time::{Local, Span, Time};
 use isodp::wire::control::GlobalControl;
-use isodp::wire::drive::{G1Stw, G1Zsw, Inputs81, Outputs81, Stw2, Zsw2};
+use isodp::wire::drive::{G1Stw, G1Zsw, Inputs81, Outputs81, SignOfLife, Stw2, Zsw2};
 use isodp::wire::{Address, Fcb, Frame, FrameControl, Header, Service, Status, Telegram};
 use std::hint::black_box;
 
@@ -232,10 +232,10 @@ impl Slave {
 
     /// T_O: the outputs take effect. What the latch of this cycle will say beside the position.
     fn set_point(&mut self, witness: &mut impl Witness) -> (Inputs81, Xist1, Xist2) {
-        let mls = LifeSign::from_word(self.outputs.stw2.0).value();
+        let mls = SignOfLife::from_word(self.outputs.stw2.0).get();
         self.life.cycle(mls);
         let sls = self.own.cycle(self.life.is_synchronised());
-        witness.set_point(self.address, mls, sls.value());
+        witness.set_point(self.address, mls, sls.get());
         let answer = self.sensor.cycle(self.outputs.g1_stw.0, Faults::NONE);
         let inputs = Inputs81 { zsw2: Zsw2(sls.to_word()), g1_zsw: G1Zsw(answer.zsw), ..Inputs81::default() };
         (inputs, answer.xist1, answer.xist2)
@@ -424,8 +424,8 @@ impl<const OCTETS: bool> Straight<OCTETS> {
         } else {
             slave.inputs
         };
-        let sign = LifeSign::from_word(inputs.zsw2.0);
-        let step = slave.axis.monitor.cycle(sign.value());
+        let sign = SignOfLife::from_word(inputs.zsw2.0);
+        let step = slave.axis.monitor.cycle(sign.get());
         self.received ^= u64::from(inputs.xist1) << u32::from(step.tripped) ^ u64::from(inputs.xist2);
         self.crystal.to_local(replied + slave.delay)
     }

@@ -6,13 +6,13 @@
 use alloc::vec::Vec;
 
 use crate::device::parameter_client::ParameterClient;
-use crate::device::sign_of_life::{LifeSign, Monitor, MonitorSettings};
+use crate::device::sign_of_life::{Monitor, MonitorSettings};
 use crate::dp::master::Application;
 use crate::dp::ms1::{Failure, Job};
 use crate::fdl::Outbox;
 use crate::observation::{LifeState, MasterMode, Observation};
 use crate::wire::Address;
-use crate::wire::drive::{G1Stw, Inputs81, Outputs81, Stw2};
+use crate::wire::drive::{G1Stw, Inputs81, Outputs81, SignOfLife, Stw2};
 use crate::wire::parameter::{Format, ParameterAddress};
 
 /// Tolerated failures of a slave's sign of life (Model: D17).
@@ -71,18 +71,18 @@ struct Axis {
     slave: Address,
     joined: bool,
     /// Own sign of life for this slave and the cycles for which it has been sent.
-    sign: LifeSign,
+    sign: SignOfLife,
     age: u8,
     /// Cycles that the first value still waits.
     wait: u32,
     /// What the coming cycle sends instead.
-    jump: Option<LifeSign>,
+    jump: Option<SignOfLife>,
     held: Held,
     control: G1Stw,
     acknowledge: u8,
     monitor: Monitor,
     /// Sign of life last received; it counts again where nothing comes.
-    received: LifeSign,
+    received: SignOfLife,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -106,7 +106,7 @@ impl Controller {
         let axis = |slave| Axis {
             slave,
             joined: false,
-            sign: LifeSign::INVALID,
+            sign: SignOfLife::NONE,
             age: 0,
             wait: life.delay,
             jump: None,
@@ -114,7 +114,7 @@ impl Controller {
             control: G1Stw::default(),
             acknowledge: 0,
             monitor: Monitor::new(MonitorSettings::new(1, TOLERANCE)),
-            received: LifeSign::INVALID,
+            received: SignOfLife::NONE,
         };
         Self { axes: slaves.into_iter().map(axis).collect(), life, parameters: ParameterClient::default() }
     }
@@ -140,7 +140,7 @@ impl Axis {
         } else if !self.sign.is_valid() && self.wait > 0 {
             self.wait -= 1;
         } else if !self.sign.is_valid() {
-            (self.sign, self.age) = (LifeSign::new(life.start), 0);
+            (self.sign, self.age) = (SignOfLife::masked(life.start), 0);
         } else if self.held == Held::No && self.age + 1 >= life.t_mapc {
             (self.sign, self.age) = (self.sign.next(), 0);
         } else {
@@ -155,7 +155,7 @@ impl Axis {
     }
     fn check(&mut self, out: &mut Outbox) {
         let from = self.monitor.state();
-        let step = self.monitor.cycle(self.received.value());
+        let step = self.monitor.cycle(self.received.get());
         let to = self.monitor.state();
         if from != to {
             out.observe(Observation::SlaveLife { slave: self.slave, from, to, tripped: step.tripped });
@@ -171,7 +171,7 @@ impl Application for Controller {
             if axis.joined && mode == MasterMode::Operate {
                 axis.count(self.life, out);
             } else {
-                (axis.sign, axis.jump, axis.wait) = (LifeSign::INVALID, None, self.life.delay);
+                (axis.sign, axis.jump, axis.wait) = (SignOfLife::NONE, None, self.life.delay);
             }
         }
     }
@@ -184,7 +184,7 @@ impl Application for Controller {
     fn inputs(&mut self, slave: usize, inputs: Option<&[u8]>, out: &mut Outbox) {
         let axis = &mut self.axes[slave];
         if let Some(inputs) = inputs.and_then(Inputs81::parse) {
-            axis.received = LifeSign::from_word(inputs.zsw2.0);
+            axis.received = SignOfLife::from_word(inputs.zsw2.0);
         }
         axis.check(out);
     }
@@ -192,8 +192,8 @@ impl Application for Controller {
         let axis = &mut self.axes[slave];
         let from = axis.monitor.state();
         axis.joined = joined;
-        (axis.sign, axis.wait) = (LifeSign::INVALID, self.life.delay);
-        axis.received = LifeSign::INVALID;
+        (axis.sign, axis.wait) = (SignOfLife::NONE, self.life.delay);
+        axis.received = SignOfLife::NONE;
         axis.monitor.reset();
         if from != LifeState::Waiting {
             let to = LifeState::Waiting;
@@ -208,7 +208,7 @@ impl Application for Controller {
             Command::ControlWord(_, bits) => axis.control = bits,
             Command::HoldLife(_, cycles) => axis.hold(cycles.map_or(Held::ForGood, Held::For), out),
             Command::ReleaseLife(_) => axis.hold(Held::No, out),
-            Command::JumpLife(_, to) => axis.jump = Some(LifeSign::new(to)),
+            Command::JumpLife(_, to) => axis.jump = Some(SignOfLife::masked(to)),
             Command::ReadParameter(_, parameter) => {
                 self.parameters.ask((slave, axis.slave), parameter, None, out);
             }

@@ -13,11 +13,11 @@
 
 use crate::device::options::{LifeStart, UnitOptions};
 use crate::device::pll::{Change, Judgement, Pll, PllSettings};
-use crate::device::sensor::Fault;
 use crate::device::sign_of_life::{Counter, Monitor, MonitorSettings, Verdict};
 use crate::fdl::{Outbox, Timer};
 use crate::observation::{ClockVerdict, LifeState, Observation, Phase, PllState};
 use crate::time::{Local, Span};
+use crate::wire::drive::SensorFault;
 use crate::wire::prm::IsoM;
 
 /// What the isochronous part is told by the parameters.
@@ -91,7 +91,7 @@ impl Isochronous {
     }
     /// Own sign of life, bits 15..12 of ZSW2.
     pub fn own_sign(&self) -> u8 {
-        self.own.sign().value()
+        self.own.sign().get()
     }
 
     /// Data exchange begins: positions come along with requests until the clock is locked (Model: D8).
@@ -124,18 +124,18 @@ impl Isochronous {
     }
 
     /// SYNCH arrived. Returns the fault that this makes.
-    pub fn synch(&mut self, now: Local, out: &mut Outbox) -> Option<Fault> {
+    pub fn synch(&mut self, now: Local, out: &mut Outbox) -> Option<SensorFault> {
         let before = self.pll.state();
         let judgement = self.pll.synch(now)?;
         self.judged(before, judgement, out)
     }
     /// [`Timer::Window`] came due. Returns the fault that this makes.
-    pub fn window_closed(&mut self, now: Local, out: &mut Outbox) -> Option<Fault> {
+    pub fn window_closed(&mut self, now: Local, out: &mut Outbox) -> Option<SensorFault> {
         let before = self.pll.state();
         let judgement = self.pll.window_closed(now)?;
         self.judged(before, judgement, out)
     }
-    fn judged(&mut self, before: PllState, judgement: Judgement, out: &mut Outbox) -> Option<Fault> {
+    fn judged(&mut self, before: PllState, judgement: Judgement, out: &mut Outbox) -> Option<SensorFault> {
         out.observe(Observation::Clock {
             verdict: judgement.verdict,
             error: judgement.error,
@@ -155,7 +155,7 @@ impl Isochronous {
             }
             Change::Lost => {
                 self.lost(out);
-                return Some(Fault::Clock);
+                return Some(SensorFault::Clock);
             }
             Change::None | Change::Restarted => {}
         }
@@ -184,11 +184,11 @@ impl Isochronous {
     }
 
     /// T_O: compares the master's sign of life. Returns the fault that this makes.
-    pub fn set_point(&mut self, mls: u8, out: &mut Outbox) -> Option<Fault> {
+    pub fn set_point(&mut self, mls: u8, out: &mut Outbox) -> Option<SensorFault> {
         let before = self.life.state();
         let step = self.life.cycle(mls);
         let runs = self.life.is_synchronised() || self.settings.life_start == LifeStart::AfterClock;
-        let sls = self.own.cycle(runs).value();
+        let sls = self.own.cycle(runs).get();
         out.observe(Observation::SetPoint {
             mls,
             sls,
@@ -204,7 +204,7 @@ impl Isochronous {
             },
             out,
         );
-        step.tripped.then_some(Fault::MasterLife)
+        step.tripped.then_some(SensorFault::LifeSign)
     }
 
     fn enter_phase(&mut self, to: Phase, out: &mut Outbox) {

@@ -18,30 +18,7 @@
 //! Model: D18. Parking suppresses errors: entering it clears all latched faults, none is latched during it, and
 //! G1_XIST1 and G1_XIST2 read 0. Model: D19. A reserved bit 0 to 10 set is the cause of 0F01 as long as it is set.
 
-/// Faults of the encoder, as G1_XIST2 names them (manual 5.3).
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub enum Fault {
-    /// 0F01, the requested command is not supported.
-    Command,
-    /// 0F02, too many failures of the master's sign of life.
-    MasterLife,
-    /// 0F04, too many failures of the clock.
-    Clock,
-}
-
-impl Fault {
-    /// Every fault, in the order in which they are latched if they arise in the same cycle (Model: by code).
-    pub const ALL: [Self; 3] = [Self::Command, Self::MasterLife, Self::Clock];
-
-    /// Code in G1_XIST2 (manual 5.3).
-    pub const fn code(self) -> u16 {
-        match self {
-            Self::Command => 0x0F01,
-            Self::MasterLife => 0x0F02,
-            Self::Clock => 0x0F04,
-        }
-    }
-}
+use crate::wire::drive::SensorFault;
 
 /// A set of faults.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug)]
@@ -53,11 +30,11 @@ impl Faults {
 
     /// This set and `fault`.
     #[must_use]
-    pub const fn with(self, fault: Fault) -> Self {
+    pub const fn with(self, fault: SensorFault) -> Self {
         Self(self.0 | 1 << fault as u8)
     }
     /// Whether `fault` is in the set.
-    pub const fn contains(self, fault: Fault) -> bool {
+    pub const fn contains(self, fault: SensorFault) -> bool {
         self.0 & 1 << fault as u8 != 0
     }
     /// Whether the set is empty.
@@ -70,44 +47,48 @@ impl Faults {
         Self(self.0 & !other.0)
     }
     /// The faults in the order of their codes.
-    pub fn iter(self) -> impl Iterator<Item = Fault> {
-        Fault::ALL.into_iter().filter(move |&fault| self.contains(fault))
+    pub fn iter(self) -> impl Iterator<Item = SensorFault> {
+        SensorFault::ALL.iter().copied().filter(move |&fault| self.contains(fault))
     }
 }
-impl From<Fault> for Faults {
-    fn from(fault: Fault) -> Self {
+impl From<SensorFault> for Faults {
+    fn from(fault: SensorFault) -> Self {
         Self::NONE.with(fault)
     }
 }
 
 /// Bits of G1_STW (manual 2.2).
 pub mod stw {
+    use crate::wire::drive::G1Stw;
+
     /// Bits 0 to 10, reserved.
-    pub const RESERVED: u16 = 0x07FF;
+    pub const RESERVED: u16 = !G1Stw::NAMED.0;
     /// Bit 11, home position mode: 0 = set (absolute), 1 = shift (relative).
-    pub const RELATIVE: u16 = 1 << 11;
+    pub const RELATIVE: u16 = G1Stw::HOME_MODE.0;
     /// Bit 12, set preset or request shift, on the rising edge.
-    pub const PRESET: u16 = 1 << 12;
+    pub const PRESET: u16 = G1Stw::PRESET.0;
     /// Bit 13, request the absolute value cyclically.
-    pub const VALUE: u16 = 1 << 13;
+    pub const VALUE: u16 = G1Stw::ABSOLUTE_VALUE.0;
     /// Bit 14, activate parking sensor.
-    pub const PARK: u16 = 1 << 14;
+    pub const PARK: u16 = G1Stw::PARKING.0;
     /// Bit 15, acknowledge a sensor error.
-    pub const ACKNOWLEDGE: u16 = 1 << 15;
+    pub const ACKNOWLEDGE: u16 = G1Stw::ACKNOWLEDGE.0;
 }
 
 /// Bits of G1_ZSW (manual 2.2).
 pub mod zsw {
+    use crate::wire::drive::G1Zsw;
+
     /// Bit 11, acknowledgement of a sensor error in process.
-    pub const ACKNOWLEDGING: u16 = 1 << 11;
+    pub const ACKNOWLEDGING: u16 = G1Zsw::ACKNOWLEDGING.0;
     /// Bit 12, preset or shift executed.
-    pub const PRESET: u16 = 1 << 12;
+    pub const PRESET: u16 = G1Zsw::PRESET_DONE.0;
     /// Bit 13, the absolute value is transmitted cyclically.
-    pub const VALUE: u16 = 1 << 13;
+    pub const VALUE: u16 = G1Zsw::ABSOLUTE_VALUE.0;
     /// Bit 14, parking sensor activated.
-    pub const PARKED: u16 = 1 << 14;
+    pub const PARKED: u16 = G1Zsw::PARKING.0;
     /// Bit 15, sensor error.
-    pub const ERROR: u16 = 1 << 15;
+    pub const ERROR: u16 = G1Zsw::ERROR.0;
 }
 
 /// How an acknowledgement shows and ends. Makes of encoders differ (Model: D18).
@@ -209,7 +190,7 @@ pub struct Answer {
     /// Faults latched in this cycle.
     pub latched: Faults,
     /// The fault cleared by acknowledgement in this cycle.
-    pub cleared: Option<Fault>,
+    pub cleared: Option<SensorFault>,
 }
 
 impl Answer {
@@ -221,11 +202,11 @@ impl Answer {
 /// Latched faults, each at most once, the first latched in front.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 struct Latch {
-    faults: [Option<Fault>; Fault::ALL.len()],
+    faults: [Option<SensorFault>; SensorFault::ALL.len()],
 }
 
 impl Latch {
-    fn first(self) -> Option<Fault> {
+    fn first(self) -> Option<SensorFault> {
         self.faults[0]
     }
     fn set(self) -> Faults {
@@ -253,7 +234,7 @@ enum State {
     Error,
     Acknowledge {
         /// The fault being acknowledged.
-        fault: Fault,
+        fault: SensorFault,
         /// Whether its cause is gone and it is cleared.
         cleared: bool,
     },
@@ -347,7 +328,7 @@ impl Sensor {
     fn request(&self, stw: u16, causes: Faults) -> Request {
         let rising = stw & !self.last;
         let unsupported = stw & stw::RESERVED != 0 || (!self.options.preset_enabled && rising & stw::PRESET != 0);
-        let causes = if unsupported { causes.with(Fault::Command) } else { causes };
+        let causes = if unsupported { causes.with(SensorFault::Unsupported) } else { causes };
         Request { stw, rising, causes }
     }
 
@@ -385,7 +366,7 @@ impl Sensor {
         }
     }
 
-    fn acknowledge(&mut self, fault: Fault, cleared: bool, request: Request, answer: &mut Answer) -> State {
+    fn acknowledge(&mut self, fault: SensorFault, cleared: bool, request: Request, answer: &mut Answer) -> State {
         let held = request.stw & stw::ACKNOWLEDGE != 0;
         let until_reset = self.options.acknowledgement == Acknowledgement::UntilReset;
         if cleared {
@@ -400,7 +381,7 @@ impl Sensor {
     }
 
     /// Clears the fault in front unless its cause is still there, and tells whether it is gone.
-    fn clear(&mut self, fault: Fault, request: Request, answer: &mut Answer) -> bool {
+    fn clear(&mut self, fault: SensorFault, request: Request, answer: &mut Answer) -> bool {
         let gone = !request.causes.contains(fault);
         if gone {
             self.latch.clear_first();
@@ -456,8 +437,8 @@ mod tests {
     use alloc::vec::Vec;
 
     const ACK: u16 = stw::ACKNOWLEDGE;
-    const LIFE: Faults = Faults::NONE.with(Fault::MasterLife);
-    const CLOCK: Faults = Faults::NONE.with(Fault::Clock);
+    const LIFE: Faults = Faults::NONE.with(SensorFault::LifeSign);
+    const CLOCK: Faults = Faults::NONE.with(SensorFault::Clock);
 
     fn sensor(acknowledgement: Acknowledgement) -> Sensor {
         Sensor::new(SensorOptions { acknowledgement, ..SensorOptions::default() })
@@ -538,12 +519,12 @@ mod tests {
     fn faults_are_shown_one_after_the_other() {
         let mut sensor = sensor(Acknowledgement::Immediate);
         assert_eq!(sensor.cycle(0, CLOCK).latched, CLOCK);
-        assert_eq!(sensor.cycle(0, LIFE.with(Fault::Clock)).latched, LIFE, "0F04 is latched already");
+        assert_eq!(sensor.cycle(0, LIFE.with(SensorFault::Clock)).latched, LIFE, "0F04 is latched already");
         sensor.cycle(1, Faults::NONE);
         let codes: Vec<_> = (0..3)
             .map(|_| {
                 let Xist2::Code(code) = sensor.cycle(0, Faults::NONE).xist2 else { unreachable!() };
-                assert_eq!(sensor.cycle(ACK, Faults::NONE).cleared.map(Fault::code), Some(code));
+                assert_eq!(sensor.cycle(ACK, Faults::NONE).cleared.map(SensorFault::code), Some(code));
                 code
             })
             .collect();
@@ -555,7 +536,7 @@ mod tests {
     fn reserved_bits_are_a_command_that_is_not_supported() {
         for bit in 0..16 {
             let answer = sensor(Acknowledgement::Immediate).cycle(1 << bit, Faults::NONE);
-            assert_eq!(answer.latched.contains(Fault::Command), bit <= 10, "bit {bit}");
+            assert_eq!(answer.latched.contains(SensorFault::Unsupported), bit <= 10, "bit {bit}");
         }
         // While they are set the cause is there, and clearing takes longer than a cycle: bit 11 (manual 2.2).
         let mut sensor = sensor(Acknowledgement::Immediate);

@@ -18,41 +18,7 @@
 //! one is forgotten. 0 is a wrong value like any other.
 
 use crate::observation::LifeState;
-
-/// A sign of life: 1..=15 in turn, 0 = invalid or not running (manual 2.2; bits 12-15 of STW2 and ZSW2).
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Debug)]
-pub struct LifeSign(u8);
-
-impl LifeSign {
-    /// Not running.
-    pub const INVALID: Self = Self(0);
-
-    /// The sign in the low four bits of `value`.
-    pub const fn new(value: u8) -> Self {
-        Self(value & 0x0F)
-    }
-    /// The sign in bits 12-15 of STW2 or ZSW2 (manual 2.2).
-    pub const fn from_word(word: u16) -> Self {
-        Self((word >> 12) as u8)
-    }
-    /// STW2 or ZSW2 with this sign in bits 12-15, the unused bits 0 (manual 2.2).
-    pub const fn to_word(self) -> u16 {
-        (self.0 as u16) << 12
-    }
-    /// Value, 0..=15.
-    pub const fn value(self) -> u8 {
-        self.0
-    }
-    /// Whether the value is 1..=15.
-    pub const fn is_valid(self) -> bool {
-        self.0 != 0
-    }
-    /// The following value: 0 to 1, 1 to 2, … 15 to 1 (manual 2.2: 0 is left out).
-    #[must_use]
-    pub const fn next(self) -> Self {
-        Self(if self.0 == 15 { 1 } else { self.0 + 1 })
-    }
-}
+use crate::wire::drive::SignOfLife;
 
 /// Failure counter: what one wrong value adds (Model: D16).
 const FAILURE_WEIGHT: u32 = 10;
@@ -83,13 +49,13 @@ impl MonitorSettings {
 /// What a value must be, running freely from the start value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Expectation {
-    sign: LifeSign,
+    sign: SignOfLife,
     /// DP cycles this value has been expected, this one included, 1..=hold.
     cycles: u8,
 }
 
 impl Expectation {
-    fn start(sign: LifeSign) -> Self {
+    fn start(sign: SignOfLife) -> Self {
         Self { sign, cycles: 1 }
     }
     fn next(self, hold: u8) -> Self {
@@ -103,7 +69,7 @@ impl Expectation {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum State {
-    Waiting { last: Option<LifeSign> },
+    Waiting { last: Option<SignOfLife> },
     Strict { expected: Expectation, steps: u8 },
     Confirming { expected: Expectation, cycles: u8 },
     Operating { expected: Expectation },
@@ -121,7 +87,7 @@ pub enum Verdict {
     /// Not as expected.
     Wrong {
         /// The value that was expected.
-        expected: LifeSign,
+        expected: SignOfLife,
     },
 }
 
@@ -162,7 +128,7 @@ impl Monitor {
 
     /// The value received in this DP cycle, in the low four bits; once per DP cycle while the clock is locked.
     pub fn cycle(&mut self, received: u8) -> Step {
-        let received = LifeSign::new(received);
+        let received = SignOfLife::masked(received);
         match self.state {
             State::Waiting { last } => self.waiting(last, received),
             State::Strict { expected, steps } => self.strict(expected.next(self.settings.hold), steps, received),
@@ -198,7 +164,7 @@ impl Monitor {
         &self.settings
     }
 
-    fn waiting(&mut self, last: Option<LifeSign>, received: LifeSign) -> Step {
+    fn waiting(&mut self, last: Option<SignOfLife>, received: SignOfLife) -> Step {
         if received.is_valid() && last.is_some_and(|last| last != received) {
             self.failures = 0;
             self.enter(State::Strict { expected: Expectation::start(received), steps: 0 }, Verdict::Start)
@@ -207,7 +173,7 @@ impl Monitor {
         }
     }
 
-    fn strict(&mut self, expected: Expectation, steps: u8, received: LifeSign) -> Step {
+    fn strict(&mut self, expected: Expectation, steps: u8, received: SignOfLife) -> Step {
         if received != expected.sign {
             return self.give_up(expected, received);
         }
@@ -222,7 +188,7 @@ impl Monitor {
         self.enter(next, Verdict::Right)
     }
 
-    fn confirming(&mut self, expected: Expectation, cycles: u8, received: LifeSign) -> Step {
+    fn confirming(&mut self, expected: Expectation, cycles: u8, received: SignOfLife) -> Step {
         if received != expected.sign {
             return self.give_up(expected, received);
         }
@@ -235,7 +201,7 @@ impl Monitor {
         self.enter(next, Verdict::Right)
     }
 
-    fn operating(&mut self, expected: Expectation, received: LifeSign) -> Step {
+    fn operating(&mut self, expected: Expectation, received: SignOfLife) -> Step {
         if received == expected.sign {
             self.failures = self.failures.saturating_sub(1);
             return self.enter(State::Operating { expected }, Verdict::Right);
@@ -249,7 +215,7 @@ impl Monitor {
         }
     }
 
-    fn give_up(&mut self, expected: Expectation, received: LifeSign) -> Step {
+    fn give_up(&mut self, expected: Expectation, received: SignOfLife) -> Step {
         self.enter(State::Waiting { last: Some(received) }, Verdict::Wrong { expected: expected.sign })
     }
 
@@ -265,24 +231,24 @@ impl Monitor {
 /// The own sign of life (manual 2.1.4): 0 while it does not run, then 1 and one more in every cycle.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct Counter {
-    sign: LifeSign,
+    sign: SignOfLife,
 }
 
 impl Counter {
     /// A counter that does not run.
     pub const fn new() -> Self {
-        Self { sign: LifeSign::INVALID }
+        Self { sign: SignOfLife::NONE }
     }
     /// The sign to send in this cycle; once per `T_DP` at the slave, once per `T_MAPC` at the master.
     ///
     /// `running` is [`Monitor::is_synchronised`] after the monitor's cycle: the first running cycle sends 1 (Model:
     /// D16), the cycle in which the monitor trips sends 0 (manual 2.1.3).
-    pub fn cycle(&mut self, running: bool) -> LifeSign {
-        self.sign = if running { self.sign.next() } else { LifeSign::INVALID };
+    pub fn cycle(&mut self, running: bool) -> SignOfLife {
+        self.sign = if running { self.sign.next() } else { SignOfLife::NONE };
         self.sign
     }
     /// The sign sent last.
-    pub const fn sign(self) -> LifeSign {
+    pub const fn sign(self) -> SignOfLife {
         self.sign
     }
 }
@@ -294,7 +260,7 @@ mod tests {
     use alloc::vec::Vec;
 
     fn after(sign: u8, steps: usize) -> u8 {
-        (0..steps).fold(LifeSign::new(sign), |sign, _| sign.next()).value()
+        (0..steps).fold(SignOfLife::masked(sign), |sign, _| sign.next()).get()
     }
     /// The value of an error-free master in DP cycle `k` after its start value 1.
     fn good(k: usize, hold: u8) -> u8 {
@@ -325,7 +291,7 @@ mod tests {
     fn the_sign_of_life_counts_from_1_to_15_and_leaves_0_out() {
         let signs: Vec<u8> = (0..17).map(|k| after(0, k)).collect();
         assert_eq!(signs, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 1]);
-        assert_eq!(LifeSign::from_word(0xB7FF).to_word(), 0xB000);
+        assert_eq!(SignOfLife::from_word(0xB7FF).to_word(), 0xB000);
     }
 
     #[test]
@@ -337,7 +303,7 @@ mod tests {
             monitor.cycle(0);
             for k in 0..400 {
                 let step = monitor.cycle(good(k, hold));
-                let sign = own.cycle(monitor.is_synchronised()).value();
+                let sign = own.cycle(monitor.is_synchronised()).get();
                 let expected = if k < 16 * n { 0 } else { after(1, k - 16 * n) };
                 assert_eq!(sign, expected, "n {n} cycle {k}");
                 let entered = match k {
@@ -391,7 +357,7 @@ mod tests {
         let step = monitor.cycle(6);
         assert!(step.tripped);
         assert_eq!((step.entered, monitor.failures()), (Some(LifeState::Waiting), 20));
-        assert_eq!(own.cycle(monitor.is_synchronised()), LifeSign::INVALID, "0 in the cycle of the trip");
+        assert_eq!(own.cycle(monitor.is_synchronised()), SignOfLife::NONE, "0 in the cycle of the trip");
         let step = monitor.cycle(9);
         assert_eq!((step.verdict, step.tripped, monitor.failures()), (Verdict::Start, false, 0));
         assert!((10..=15).chain(1..=9).all(|value| monitor.cycle(value).verdict == Verdict::Right));
@@ -562,7 +528,7 @@ mod tests {
     /// A mostly correct stream: stale values, wrong ones, zeros, lost and doubled cycles, restarts of the master.
     fn stream(random: &mut Lcg, hold: u8, length: usize) -> Vec<u8> {
         let mut received = vec![random.below(16) as u8];
-        let (mut sign, mut age) = (LifeSign::new(random.below(16) as u8), 0);
+        let (mut sign, mut age) = (SignOfLife::masked(random.below(16) as u8), 0);
         let rate = [15, 60, 400, 5_000][random.below(4) as usize];
         while received.len() < length {
             age += 1;
@@ -574,14 +540,14 @@ mod tests {
                 1 => random.below(16) as u8,
                 2 => 0,
                 3 => {
-                    sign = LifeSign::new(random.below(16) as u8);
-                    sign.value()
+                    sign = SignOfLife::masked(random.below(16) as u8);
+                    sign.get()
                 }
                 4 => {
                     age += 1;
-                    sign.value()
+                    sign.get()
                 }
-                _ => sign.value(),
+                _ => sign.get(),
             });
         }
         received
@@ -591,7 +557,7 @@ mod tests {
     fn the_monitor_agrees_with_a_decision_from_the_whole_history() {
         let mut random = Lcg(20_070_101);
         let mut reached = [0u32; 5];
-        for round in 0..200_000 {
+        for round in 0..2_000_000u32 {
             let hold = if round % 4 == 0 { 1 + random.below(14) as u8 } else { 1 + random.below(3) as u8 };
             let tolerance = random.below(5) as u16;
             let length = 1 + random.below(if round % 50 == 0 { 700 } else { 130 }) as usize;

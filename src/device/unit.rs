@@ -9,7 +9,7 @@ use crate::device::isochronous::{IsoSettings, Isochronous};
 use crate::device::leds::{LedInput, LedLogic};
 use crate::device::options::UnitOptions;
 use crate::device::profile::Profile;
-use crate::device::sensor::{Answer, Fault, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
+use crate::device::sensor::{Answer, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
 use crate::dp::ms1::Records;
 use crate::dp::slave::{Application, Identity, Refusal, Slave};
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
@@ -17,7 +17,7 @@ use crate::observation::{self, Leds, Observation, Phase, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::Address;
 use crate::wire::acyclic::{ErrorCode, Record};
-use crate::wire::drive::{G1Zsw, Inputs81, Outputs81, Zsw2};
+use crate::wire::drive::{G1Zsw, Inputs81, Outputs81, SensorFault, Zsw2};
 use crate::wire::prm::{Block, BlockType, IsoM, SetPrm};
 
 /// What one kind of unit does and another does not.
@@ -190,7 +190,7 @@ impl<F: Function> Body<F> {
         }
     }
     /// Keeps a fault for the next cycle of the handshake.
-    fn raise(&mut self, fault: Option<Fault>) {
+    fn raise(&mut self, fault: Option<SensorFault>) {
         if let Some(fault) = fault {
             self.causes = self.causes.with(fault);
         }

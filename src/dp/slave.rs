@@ -15,6 +15,7 @@
 //! | DATA_EXCH | bad Chk_Cfg | WAIT_PRM, Cfg_Fault | SC |
 //! | DATA_EXCH | Data_Exchange, RD_Inp, RD_Outp | DATA_EXCH | data |
 //! | DATA_EXCH | Data_Exchange of another length | WAIT_PRM | RS |
+//! | DATA_EXCH | Data_Exchange by MSRD without Publisher_Enable | DATA_EXCH | RS |
 //! | DATA_EXCH | MS1 with DPV1_Enable | DATA_EXCH | see [`ms1`](crate::dp::ms1) |
 //! | any but POWER_ON | Slave_Diag, Get_Cfg | unchanged | data |
 //! | any | Set_Prm with neither Lock nor Unlock | unchanged, min T_SDR in force | SC |
@@ -32,7 +33,7 @@ use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::control::GlobalControl;
 use crate::wire::diag::{DiagStatus, Diagnosis};
 use crate::wire::prm::{PrmError, SetPrm};
-use crate::wire::{Address, Header, Sap, Status};
+use crate::wire::{Address, FrameControl, Header, Sap, Service, Status};
 
 /// Time from an acyclic request to its answer. Model: none of the sources has a number.
 const ACYCLIC_TIME: Span = Span::from_ms(2);
@@ -141,6 +142,8 @@ pub struct Slave {
     watchdog: Option<Span>,
     group: u8,
     fail_safe: bool,
+    /// Publisher_Enable: MSRD is answered.
+    publisher: bool,
     /// DPV1_Enable: MS1 is open.
     dpv1: bool,
     ms1: Server,
@@ -159,6 +162,7 @@ impl Slave {
             watchdog: None,
             group: 0,
             fail_safe: false,
+            publisher: false,
             dpv1: false,
             ms1: Server::new(ACYCLIC_TIME),
             outputs: [0; MAX_OUTPUTS],
@@ -257,7 +261,8 @@ impl Slave {
 
     fn data_exchange(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
         let &Arrived { now, header, du, sample } = request;
-        if self.state != SlaveState::DataExch || self.is_foreign(header.sa) {
+        let published = matches!(header.fc, FrameControl::Request { service: Service::Msrd, .. });
+        if self.state != SlaveState::DataExch || self.is_foreign(header.sa) || (published && !self.publisher) {
             return self.refuse(now, out);
         }
         let expected = usize::from(self.identity.outputs);
@@ -334,6 +339,7 @@ impl Slave {
         self.fault = DiagStatus::default();
         self.group = prm.group;
         self.fail_safe = prm.dpv1.fail_safe();
+        self.publisher = prm.dpv1.publisher_enable();
         self.dpv1 = prm.dpv1.dpv1_enable();
         self.passive.set_min_tsdr(Tbit(prm.min_tsdr.into()));
         let step = Span::from_ms(prm.watchdog_base_ms().into());

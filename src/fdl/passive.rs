@@ -91,7 +91,8 @@ impl Passive {
         // A broken telegram is dropped without a word (EN 50170-2).
         let Ok(Telegram::Data { header, du }) = Telegram::parse(heard.octets) else { return Indication::Nothing };
         match header.fc {
-            FrameControl::Response { .. } if header.da == Address::BROADCAST => {
+            // A publisher that refuses has published nothing.
+            FrameControl::Response { status: Status::Dl | Status::Dh, .. } if header.da == Address::BROADCAST => {
                 Indication::Published { publisher: header.sa, du }
             }
             FrameControl::Response { .. } => Indication::Nothing,
@@ -229,6 +230,20 @@ mod tests {
         station.heard(Local::ZERO, Heard { octets: frame.octets(), sample: 0 }, &mut out);
         station.reply(Local::ZERO, Status::Dl, 1, &mut out, |_| ());
         assert_eq!(out.sending().unwrap().1.octets()[4], 127);
+    }
+
+    #[test]
+    fn a_publisher_that_refuses_publishes_nothing() {
+        let mut station = Passive::new(SLAVE, BitRate::M12, Tbit(30));
+        for (status, published) in [(Status::Dl, true), (Status::Dh, true), (Status::Rs, false), (Status::Rr, false)] {
+            let fc = FrameControl::slave(status);
+            let header = Header { da: Address::BROADCAST, sa: OTHER, dsap: None, ssap: None, fc };
+            let mut frame = Frame::new();
+            frame.set_data(&header, &[]).unwrap();
+            let heard = Heard { octets: frame.octets(), sample: 0 };
+            let indication = station.heard(Local::ZERO, heard, &mut Outbox::new());
+            assert_eq!(matches!(indication, Indication::Published { .. }), published, "{status}");
+        }
     }
 
     #[test]

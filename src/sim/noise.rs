@@ -5,8 +5,8 @@
 //! own few lines, in integers, `sqrt` and `libm` alone: each value is the same on every machine and in every release.
 
 use crate::time::Span;
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// Separates these keys from those of any other user of ChaCha8.
 const KEY_DOMAIN: [u8; 8] = *b"isodp/v1";

@@ -627,7 +627,7 @@ mod tests {
         let mut twice = histograms.clone();
         twice.merge(&histograms);
         assert_eq!(twice.get("wire", Subject::Link(a(3), a(5))).map(Histogram::count), Some(2));
-        let stranger = SlaveLayout { address: a(9), t_i: Span::from_us(125) };
+        let stranger = SlaveLayout { address: a(9), t_i: Span::from_us(125), encoder: true };
         assert_eq!(
             Quantity::named("age").unwrap().subjects(&Layout::new(a(1), Span::from_ms(1), vec![stranger], vec![])),
             []

@@ -25,6 +25,8 @@ pub struct SlaveLayout {
     pub address: Address,
     /// T_I, counted on the master's grid (manual 3.3.5).
     pub t_i: Span,
+    /// Whether it measures a position of its own: latch skew is that of encoders (Model: D9).
+    pub encoder: bool,
 }
 
 impl Layout {
@@ -72,7 +74,7 @@ mod tests {
     #[test]
     fn slaves_and_links_are_found_by_address_whatever_their_order() {
         let a = |n| Address::new(n).unwrap();
-        let slave = |n| SlaveLayout { address: a(n), t_i: Span::from_us(125) };
+        let slave = |n| SlaveLayout { address: a(n), t_i: Span::from_us(125), encoder: true };
         let links = vec![(a(9), a(3)), (a(3), a(126)), (a(3), a(9)), (a(9), a(3))];
         let layout = Layout::new(a(1), Span::from_ms(1), vec![slave(9), slave(126), slave(3)], links);
         assert_eq!(layout.slaves().iter().map(|s| s.address.get()).collect::<Vec<_>>(), [3, 9, 126]);

@@ -10,7 +10,7 @@
 //! they observe it, so the master's `CycleStart` must come before what any slave makes of the same SYNCH.
 
 use super::count::Counts;
-use super::layout::Layout;
+use super::layout::{Layout, SlaveLayout};
 use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
 use crate::observation::{ClockVerdict, Leds, Observation, Phase, PllState, SlaveState};
 use crate::sim::crystal::Crystal;
@@ -61,6 +61,7 @@ struct Grid {
 struct Watch {
     /// The row of this cycle; what it does not renew is carried over to the next.
     row: SlaveRow,
+    encoder: bool,
     /// Number of its T_I in [`Metrics::grid`].
     grid: usize,
     /// Latch offset in counts \[steps\].
@@ -94,7 +95,7 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
                 grid.push(Grid { t_i: slave.t_i, latch: Time::ZERO });
                 grid.len() - 1
             });
-            slaves.push(Watch::new(slave.address, number));
+            slaves.push(Watch::new(slave, number));
         }
         let link = |&(publisher, subscriber): &(Address, Address)| LinkWatch {
             publisher: layout.slave(publisher).expect("a publisher is a slave"),
@@ -267,12 +268,12 @@ impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
     }
 }
 
-/// Largest minus smallest latch offset over the locked slaves, as time and in counts (Model: D9).
+/// Largest minus smallest latch offset over the locked encoders, as time and in counts (Model: D9).
 fn skew(slaves: &[Watch]) -> (Option<Span>, Option<f64>) {
     let mut locked = 0;
     let (mut low, mut high) = (Span::MAX, -Span::MAX);
     let (mut low_counts, mut high_counts) = (f64::INFINITY, f64::NEG_INFINITY);
-    for slave in slaves {
+    for slave in slaves.iter().filter(|slave| slave.encoder) {
         let Some(offset) = slave.row.latch_offset else { continue };
         locked += 1;
         (low, high) = (low.min(offset), high.max(offset));
@@ -282,11 +283,11 @@ fn skew(slaves: &[Watch]) -> (Option<Span>, Option<f64>) {
 }
 
 impl Watch {
-    fn new(slave: Address, grid: usize) -> Self {
+    fn new(slave: &SlaveLayout, grid: usize) -> Self {
         let row = SlaveRow {
             cycle: 0,
             t0: Time::ZERO,
-            slave,
+            slave: slave.address,
             state: SlaveState::PowerOn,
             phase: Phase::Configuration,
             pll: PllState::Idle,
@@ -303,7 +304,7 @@ impl Watch {
             xist1: 0,
             xist2: 0,
         };
-        Self { row, grid, offset_counts: 0.0, latched: None, travelling: None, reply: None }
+        Self { row, encoder: slave.encoder, grid, offset_counts: 0.0, latched: None, travelling: None, reply: None }
     }
 
     fn next_cycle(&mut self) {

@@ -19,7 +19,7 @@ pub struct CycleRow {
     pub t_dp_deviation: Option<Span>,
     /// From t0 to the last bit of the last Data_Exchange reply; none while no slave exchanges data.
     pub t_dx: Option<Span>,
-    /// Largest minus smallest latch offset over the locked slaves (Model: D9); none with fewer than two.
+    /// Largest minus smallest latch offset over the locked encoders (Model: D9); none with fewer than two.
     pub latch_skew: Option<Span>,
     /// The same in counts: largest minus smallest latch offset x speed of the slave's shaft (steps).
     pub skew_counts: Option<f64>,

@@ -207,7 +207,9 @@ fn cycles(scenario: &Scenario) -> u64 {
 /// The slaves that take part and their links.
 pub fn layout(scenario: &Scenario) -> Layout {
     let slaves = scenario.slaves.iter().filter(|slave| !slave.silent);
-    let slaves = slaves.map(|slave| SlaveLayout { address: slave.address, t_i: slave.times.t_i }).collect();
+    let slaves = slaves
+        .map(|slave| SlaveLayout { address: slave.address, t_i: slave.times.t_i, encoder: !slave.device.subscriber })
+        .collect();
     let links = scenario.links.iter().map(|link| (link.publisher, link.subscriber)).collect();
     Layout::new(scenario.master.address, scenario.master.t_dp, slaves, links)
 }

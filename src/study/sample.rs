@@ -16,7 +16,7 @@ pub(super) fn address(number: u8) -> Address {
 
 /// Master 1, slaves 3 and 5, 3 publishes to 5; T_DP 1 ms, T_I 125 µs.
 pub(super) fn layout() -> Layout {
-    let slave = |number| SlaveLayout { address: address(number), t_i: Span::from_us(125) };
+    let slave = |number| SlaveLayout { address: address(number), t_i: Span::from_us(125), encoder: true };
     Layout::new(address(1), Span::from_ms(1), vec![slave(3), slave(5)], vec![(address(3), address(5))])
 }
 

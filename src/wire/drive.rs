@@ -30,12 +30,17 @@ impl SignOfLife {
         if self.0 < Self::LAST.0 { Self(self.0 + 1) } else { Self::FIRST }
     }
     /// Bits 15..=12 of a word.
-    const fn of_word(word: u16) -> Self {
+    /// The sign in the low four bits of `value`.
+    pub const fn masked(value: u8) -> Self {
+        Self(value & 0x0F)
+    }
+    /// The sign in bits 15..=12 of STW2 or ZSW2.
+    pub const fn from_word(word: u16) -> Self {
         Self((word >> 12) as u8)
     }
-    /// `word` with this in bits 15..=12.
-    const fn into_word(self, word: u16) -> u16 {
-        word & 0x0FFF | (self.0 as u16) << 12
+    /// STW2 or ZSW2 with this sign in bits 15..=12, the unused bits 0.
+    pub const fn to_word(self) -> u16 {
+        (self.0 as u16) << 12
     }
 }
 impl core::fmt::Display for SignOfLife {
@@ -55,23 +60,23 @@ pub struct Zsw2(pub u16);
 impl Stw2 {
     /// The master's sign of life.
     pub const fn sign_of_life(self) -> SignOfLife {
-        SignOfLife::of_word(self.0)
+        SignOfLife::from_word(self.0)
     }
     /// The same word with this sign of life.
     #[must_use]
     pub const fn with_sign_of_life(self, sign: SignOfLife) -> Self {
-        Self(sign.into_word(self.0))
+        Self(self.0 & 0x0FFF | sign.to_word())
     }
 }
 impl Zsw2 {
     /// The slave's sign of life.
     pub const fn sign_of_life(self) -> SignOfLife {
-        SignOfLife::of_word(self.0)
+        SignOfLife::from_word(self.0)
     }
     /// The same word with this sign of life.
     #[must_use]
     pub const fn with_sign_of_life(self, sign: SignOfLife) -> Self {
-        Self(sign.into_word(self.0))
+        Self(self.0 & 0x0FFF | sign.to_word())
     }
 }
 

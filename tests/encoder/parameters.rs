@@ -362,6 +362,9 @@ fn section_3_4_a_publisher_answers_msrd_to_everybody() {
     let mut rig = Rig::exchanging(&prm(&[(8, 0xE0)]));
     assert!(matches!(rig.exchange_from(MASTER, Service::Msrd, &OUTPUTS), Reply::Data(127, du) if du.len() == 12));
     assert!(matches!(rig.exchange(&OUTPUTS), Reply::Data(MASTER, _)), "SRD is answered to its master alone");
+    let mut rig = Rig::exchanging(&PRM);
+    assert_eq!(rig.exchange_from(MASTER, Service::Msrd, &OUTPUTS), RS, "without Publisher_Enable");
+    assert_eq!(rig.state(), SlaveState::DataExch);
 }
 
 #[test]

@@ -11,9 +11,9 @@ const COLUMNS: usize = 120;
 pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let skew = &material.distributions.latch_skew;
     let mut words = Words {
-        title: "Latch skew: largest minus smallest latch instant of the locked slaves in one cycle",
+        title: "Latch skew: largest minus smallest latch instant of the locked encoders in one cycle",
         subtitle: format!(
-            "{} with at least two locked slaves, of {} in all. Height: cycles per column, logarithmic.",
+            "{} with at least two locked encoders; {} slaves in all. Height: cycles per column, logarithmic.",
             counted(skew.count, "cycle"),
             counted(material.meta.slaves.len() as u64, "slave")
         ),

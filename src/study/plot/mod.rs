@@ -1,10 +1,8 @@
 //! Plots: the pictures of a run, each an SVG file that can be understood alone.
 //!
 //! [`Plots`] and [`BusCycle`] collect while the run goes on, in memory that does not grow with the number of cycles;
-//! [`Plots::write`] draws. The same run gives the same octets. Floating point is fine here: these are pictures, no
+//! [`Plots::pictures`] draws. The same run gives the same octets. Floating point is fine here: these are pictures, no
 //! results. One picture is one file here and one line in the registry.
-
-use std::path::{Path, PathBuf};
 
 use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
 use crate::time::Span;
@@ -75,25 +73,14 @@ impl PlotMeta {
     }
 }
 
-/// Why no pictures were written.
+/// A picture that could not be drawn.
 #[derive(Debug, thiserror::Error)]
-pub enum PlotError {
-    /// The picture could not be drawn.
-    #[error("drawing {file} failed: {reason}")]
-    Draw {
-        /// Which picture.
-        file: &'static str,
-        /// What the library said.
-        reason: String,
-    },
-    /// The file could not be written.
-    #[error("writing {} failed: {source}", .path.display())]
-    File {
-        /// Which file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+#[error("drawing {file} failed: {reason}")]
+pub struct PlotError {
+    /// Which picture.
+    pub file: &'static str,
+    /// What the library said.
+    pub reason: String,
 }
 
 /// What a picture may look at.
@@ -129,31 +116,15 @@ impl Plots {
         }
     }
 
-    /// Names of the files that [`Plots::write`] makes.
+    /// Names of the files that [`Plots::pictures`] draws.
     pub fn files() -> impl Iterator<Item = &'static str> {
         PLOTS.iter().map(|plot| plot.file)
-    }
-
-    /// Draws every picture, then writes each under a temporary name and renames it. Returns the files.
-    ///
-    /// # Errors
-    /// [`PlotError::Draw`] before anything is written; [`PlotError::File`] with whole files only left behind.
-    pub fn write(&self, dir: &Path, distributions: &Distributions, bus: &BusCycle) -> Result<Vec<PathBuf>, PlotError> {
-        let pictures = self.pictures(distributions, bus)?;
-        let mut paths = Vec::with_capacity(pictures.len());
-        for (file, text) in pictures {
-            let path = dir.join(file);
-            replace(&path, &dir.join(format!(".{file}.part")), &text)
-                .map_err(|source| PlotError::File { path: path.clone(), source })?;
-            paths.push(path);
-        }
-        Ok(paths)
     }
 
     /// Every picture: name of its file and its text.
     ///
     /// # Errors
-    /// [`PlotError::Draw`] for the first picture that could not be drawn.
+    /// The first picture that could not be drawn.
     pub fn pictures(
         &self,
         distributions: &Distributions,
@@ -162,20 +133,10 @@ impl Plots {
         let material = Material { meta: &self.meta, plots: self, distributions, bus };
         let draw = |plot: &Plot| match (plot.draw)(&material) {
             Ok(text) => Ok((plot.file, text)),
-            Err(reason) => Err(PlotError::Draw { file: plot.file, reason }),
+            Err(reason) => Err(PlotError { file: plot.file, reason }),
         };
         PLOTS.iter().map(draw).collect()
     }
-}
-
-/// Writes `text` beside `path` first; a file called `path` is always whole.
-fn replace(path: &Path, part: &Path, text: &str) -> std::io::Result<()> {
-    let done = std::fs::write(part, text).and_then(|()| std::fs::rename(part, path));
-    if done.is_err() {
-        // The first error is the one to tell; a part that cannot be removed either changes nothing about it.
-        let _ = std::fs::remove_file(part);
-    }
-    done
 }
 
 impl Sink for Plots {

@@ -1,5 +1,7 @@
 //! Every picture of an invented but plausible run, read back with an XML reader and measured.
 
+use std::path::Path;
+
 use std::collections::BTreeSet;
 
 use super::look::{WIDTH, text_width};
@@ -431,28 +433,4 @@ fn every_file_of_this_folder_is_registered_or_serves_the_others() {
     let files: BTreeSet<String> = std::fs::read_dir(dir).unwrap().map(|entry| stem(&entry.unwrap().path())).collect();
     let known = Plots::files().map(|file| stem(Path::new(file))).chain(SERVING.map(str::to_owned));
     assert_eq!(files, known.collect());
-}
-
-#[test]
-fn files_are_whole_and_nothing_else_is_left() {
-    let dir = tempfile::tempdir().unwrap();
-    let world = World::new(1, 100, Span::from_ms(2));
-    let paths = world.plots.write(dir.path(), &world.distributions, &world.bus).unwrap();
-    assert_eq!(paths.len(), std::fs::read_dir(dir.path()).unwrap().count());
-    for (path, (file, text)) in paths.iter().zip(world.pictures()) {
-        assert_eq!(*path, dir.path().join(file));
-        assert_eq!(std::fs::read_to_string(path).unwrap(), text);
-    }
-    let error = world.plots.write(&dir.path().join("absent"), &world.distributions, &world.bus).unwrap_err();
-    assert!(error.to_string().contains("latch_skew.svg"), "{error}");
-}
-
-#[test]
-#[ignore = "writes target/plots/ to be looked at"]
-fn pictures_to_look_at() {
-    for (name, world) in worlds() {
-        let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/plots").join(name);
-        std::fs::create_dir_all(&dir).unwrap();
-        world.plots.write(&dir, &world.distributions, &world.bus).unwrap();
-    }
 }
