@@ -2,7 +2,7 @@
 //!
 //! No queue, no stations, no bus and no recorder: the loop knows in which order everything happens. What it leaves out
 //! on purpose is what no result depends on: timers that never come due (slot time, watchdog, clock window), the search
-//! for the next event, the question who listens, GAP polls and the repeated Operate. What it does, per slave and cycle:
+//! for the next event, the question who listens, GAP polls, the repeated Operate and the LEDs. What it does, per slave and cycle:
 //!
 //! | part | with |
 //! |---|---|
