@@ -118,10 +118,6 @@ impl Controller {
         };
         Self { axes: slaves.into_iter().map(axis).collect(), life, parameters: ParameterClient::default() }
     }
-    /// State of the check of a slave's sign of life.
-    pub fn slave_life(&self, slave: Address) -> Option<LifeState> {
-        self.axes.iter().find(|axis| axis.slave == slave).map(|axis| axis.monitor.state())
-    }
 }
 
 impl Axis {

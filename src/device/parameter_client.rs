@@ -24,6 +24,9 @@ const CHANNEL: Record = Record { slot: 1, index: Record::PARAMETER_CHANNEL };
 /// Octets of the longest answer that is asked for.
 const MAX_ANSWER: u8 = 240;
 
+/// Values of one answer that are told one by one.
+const MAX_VALUES: usize = 64;
+
 /// A request and the slave it is for.
 #[derive(Clone, Debug)]
 struct Asked {
@@ -120,6 +123,10 @@ fn tell(asked: &Asked, data: &[u8], out: &mut Outbox) {
     let Ok(response) = parameter::Response::parse(data) else {
         return out.observe(Observation::AcyclicFailed { slave, why: AcyclicFailure::Unreadable });
     };
+    // One step tells only so much, and no parameter of these devices has so many elements.
+    if response.values().map(|values| values.count().max(1)).sum::<usize>() > MAX_VALUES {
+        return out.observe(Observation::AcyclicFailed { slave, why: AcyclicFailure::Unreadable });
+    }
     if let (ResponseId::Changed, Some((_, value))) = (response.id, asked.change) {
         out.observe(Observation::ParameterValue { slave, pnu, subindex, value });
     }
@@ -143,4 +150,29 @@ fn emit(request: &Request<'_>) -> Vec<u8> {
     let len = request.emit(&mut pdu).unwrap_or(0);
     pdu.truncate(len);
     pdu
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a slave answers is data: also an answer that is far too long for one step.
+    #[test]
+    fn an_answer_with_too_many_values_is_told_as_unreadable() {
+        let slave = Address::new(3).unwrap();
+        let parameter = ParameterAddress { attribute: ParameterAddress::VALUE, elements: 200, pnu: 979, subindex: 0 };
+        let mut client = ParameterClient::default();
+        client.ask((0, slave), parameter, None, &mut Outbox::new());
+        client.job().expect("the request");
+        client.answered(Ok(&[0x5F, 1, 47, 10]), &mut Outbox::new());
+        client.job().expect("the read");
+        let mut data = vec![1, ResponseId::Read.code(), 0, 1, Format::Unsigned8.code(), 200];
+        data.resize(206, 7);
+        let mut pdu = vec![0; MAX_PDU];
+        let len = Response::Read { record: CHANNEL, data: &data }.emit(&mut pdu).expect("it fits");
+        let mut out = Outbox::new();
+        client.answered(Ok(&pdu[..len]), &mut out);
+        let told: Vec<_> = out.observations().copied().collect();
+        assert_eq!(told, [Observation::AcyclicFailed { slave, why: AcyclicFailure::Unreadable }]);
+    }
 }
