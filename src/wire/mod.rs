@@ -135,6 +135,7 @@ pub mod header;
 pub mod parameter;
 pub mod prm;
 pub mod telegram;
+pub mod words;
 #[cfg(test)]
 mod vectors;
 
