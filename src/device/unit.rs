@@ -17,6 +17,7 @@ use crate::observation::{self, Leds, Observation, Phase, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::Address;
 use crate::wire::acyclic::{ErrorCode, Record};
+use crate::wire::diag::DiagBuffer;
 use crate::wire::drive::{G1Zsw, Inputs81, Outputs81, SensorFault, Zsw2};
 use crate::wire::prm::{Block, BlockType, IsoM, SetPrm};
 
@@ -55,6 +56,12 @@ pub trait Function {
     }
     /// Data exchange is over.
     fn leave(&mut self, _out: &mut Outbox) {}
+    /// Writes the device's own part of the diagnosis.
+    fn diagnosis(&self, _diagnosis: &mut DiagBuffer) {}
+    /// Another number than before whenever [`diagnosis`](Self::diagnosis) writes something else.
+    fn diagnosis_revision(&self) -> u32 {
+        0
+    }
 }
 
 /// What is set at a unit, not by its master.
@@ -116,6 +123,9 @@ impl<F: Function> Unit<F> {
             inputs: profile.inputs,
             fail_safe: profile.fail_safe,
             publisher: profile.publisher,
+            sync: profile.sync,
+            freeze: profile.freeze,
+            max_diag: profile.max_diag,
             rate: settings.rate,
             t_sdr: settings.t_sdr,
         };
@@ -388,6 +398,12 @@ impl<F: Function> Application for Body<F> {
     }
     fn publishers(&self) -> u128 {
         self.function.publishers()
+    }
+    fn diagnosis(&self, diagnosis: &mut DiagBuffer) {
+        self.function.diagnosis(diagnosis);
+    }
+    fn diagnosis_revision(&self) -> u32 {
+        self.function.diagnosis_revision()
     }
 }
 

@@ -14,6 +14,7 @@
 //! | DATA_EXCH | good Chk_Cfg | DATA_EXCH | SC |
 //! | DATA_EXCH | bad Chk_Cfg | WAIT_PRM, Cfg_Fault | SC |
 //! | DATA_EXCH | Data_Exchange, RD_Inp, RD_Outp | DATA_EXCH | data |
+//! | DATA_EXCH | Data_Exchange after a change of the diagnosis that its master has not read | DATA_EXCH | data, DH |
 //! | DATA_EXCH | Data_Exchange of another length | WAIT_PRM | RS |
 //! | DATA_EXCH | Data_Exchange by MSRD without Publisher_Enable | DATA_EXCH | RS |
 //! | DATA_EXCH | MS1 with DPV1_Enable | DATA_EXCH | see [`ms1`](crate::dp::ms1) |
@@ -31,7 +32,7 @@ use crate::fdl::{Filter, Heard, Outbox, Timer};
 use crate::observation::{Observation, SlaveCause, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::control::GlobalControl;
-use crate::wire::diag::{DiagStatus, Diagnosis};
+use crate::wire::diag::{DiagBuffer, DiagStatus, Diagnosis};
 use crate::wire::prm::{PrmError, SetPrm};
 use crate::wire::{Address, FrameControl, Header, Sap, Service, Status};
 
@@ -96,6 +97,13 @@ pub trait Application: Records {
     fn published(&mut self, now: Local, publisher: Address, du: &[u8], out: &mut Outbox);
     /// Publishers to listen to: bit n is address n.
     fn publishers(&self) -> u128;
+    /// Writes the device's own part of the diagnosis: extended blocks, Ext_Diag, Stat_Diag.
+    fn diagnosis(&self, _diagnosis: &mut DiagBuffer) {}
+    /// Another number than before whenever [`diagnosis`](Self::diagnosis) writes something else: the replies to
+    /// Data_Exchange are then of high priority until the master has read it.
+    fn diagnosis_revision(&self) -> u32 {
+        0
+    }
 }
 
 /// What a slave is, for good.
@@ -115,6 +123,12 @@ pub struct Identity {
     pub fail_safe: bool,
     /// Answers MSRD to everybody if so parameterised.
     pub publisher: bool,
+    /// Takes Sync_Req.
+    pub sync: bool,
+    /// Takes Freeze_Req.
+    pub freeze: bool,
+    /// Max_Diag_Data_Len (octets), 6..=244.
+    pub max_diag: u8,
     /// Bit rate of the bus.
     pub rate: BitRate,
     /// Own T_SDR.
@@ -148,6 +162,15 @@ pub struct Slave {
     dpv1: bool,
     ms1: Server,
     outputs: [u8; MAX_OUTPUTS],
+    /// The diagnosis that its master knows: as it read it last, or as data exchange began.
+    known: Known,
+}
+
+/// What can change in a diagnosis during data exchange.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+struct Known {
+    /// [`Application::diagnosis_revision`].
+    device: u32,
 }
 
 impl Slave {
@@ -166,6 +189,7 @@ impl Slave {
             dpv1: false,
             ms1: Server::new(ACYCLIC_TIME),
             outputs: [0; MAX_OUTPUTS],
+            known: Known::default(),
         }
     }
     /// What it is.
@@ -222,7 +246,7 @@ impl Slave {
         let &Arrived { now, header, du, .. } = request;
         match (header.dsap, header.ssap) {
             (None, None) => self.data_exchange(request, app, out),
-            (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, out),
+            (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, header.sa, app, out),
             (Some(Sap::GET_CFG), Some(Sap::MASTER_MS0)) => {
                 let config = self.identity.config;
                 self.passive.reply(now, Status::Dl, config.len(), out, |du| du.copy_from_slice(config));
@@ -281,20 +305,34 @@ impl Slave {
                 return self.unlock(SlaveCause::OutputLength, now, app, out);
             }
         }
-        self.passive.reply(now, Status::Dl, self.identity.inputs.into(), out, |du| app.inputs(du));
+        let status = if self.news(app) == self.known { Status::Dl } else { Status::Dh };
+        self.passive.reply(now, status, self.identity.inputs.into(), out, |du| app.inputs(du));
     }
 
-    fn slave_diag(&mut self, now: Local, out: &mut Outbox) {
-        let diagnosis = self.diagnosis().emit();
-        self.passive.reply(now, Status::Dl, diagnosis.len(), out, |du| du.copy_from_slice(&diagnosis));
+    fn slave_diag(&mut self, now: Local, sa: Address, app: &impl Application, out: &mut Outbox) {
+        let mut device = DiagBuffer::new(self.identity.max_diag);
+        app.diagnosis(&mut device);
+        let diagnosis = self.diagnosis(&device);
+        let (standard, extended) = (diagnosis.emit(), diagnosis.extended);
+        self.passive.reply(now, Status::Dl, standard.len() + extended.len(), out, |du| {
+            du[..standard.len()].copy_from_slice(&standard);
+            du[standard.len()..].copy_from_slice(extended);
+        });
+        // A repeated request gets the same octets from the memory of the data link layer.
+        if self.master == Some(sa) {
+            self.known = self.news(app);
+        }
     }
-    /// The diagnosis as Slave_Diag reads it (manual 5.1).
-    pub fn diagnosis(&self) -> Diagnosis<'static> {
-        let status = (self.fault | DiagStatus::BY_SLAVE)
+    /// The diagnosis as Slave_Diag reads it (manual 5.1), with what the device adds.
+    pub fn diagnosis<'d>(&self, device: &'d DiagBuffer) -> Diagnosis<'d> {
+        let status = (self.fault | DiagStatus::BY_SLAVE | device.status())
             .with(DiagStatus::STATION_NOT_READY, self.state != SlaveState::DataExch)
             .with(DiagStatus::PRM_REQ, matches!(self.state, SlaveState::PowerOn | SlaveState::WaitPrm))
             .with(DiagStatus::WD_ON, self.watchdog.is_some());
-        Diagnosis { status, master: self.master, ident: self.identity.ident, extended: &[] }
+        Diagnosis { status, master: self.master, ident: self.identity.ident, extended: device.octets() }
+    }
+    fn news(&self, app: &impl Application) -> Known {
+        Known { device: app.diagnosis_revision() }
     }
 
     fn set_prm(&mut self, now: Local, sa: Address, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
@@ -401,6 +439,8 @@ impl Slave {
         }
         if state == SlaveState::DataExch {
             app.enter(now, out);
+            // Start-up reads the diagnosis anyway: only what changes from here on is news.
+            self.known = self.news(app);
         }
     }
 }
