@@ -6,6 +6,7 @@ use crate::time::{BitRate, Span, Tbit};
 
 /// A kind of slave that a scenario can name.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(clippy::struct_excessive_bools)] // What a GSD file says with a key each.
 pub struct Profile {
     /// The name in scenario files.
     pub name: &'static str,

@@ -381,6 +381,19 @@ impl<F: Function> Application for Body<F> {
             self.latch(sample, false, out);
         }
     }
+    fn transfer(&mut self, _now: Local, outputs: Option<&[u8]>, out: &mut Outbox) {
+        self.outputs = outputs.and_then(Outputs81::parse).unwrap_or_default();
+        // Once the clock is locked, T_O takes them over.
+        if !self.is_locked() {
+            self.take_over(out);
+        }
+    }
+    fn freeze(&mut self, _now: Local, sample: u32, out: &mut Outbox) {
+        // Once the clock is locked, what is held was latched at T_I.
+        if !self.is_locked() {
+            self.latch(sample, false, out);
+        }
+    }
     fn inputs(&self, du: &mut [u8]) {
         du.copy_from_slice(&self.inputs.emit());
     }
