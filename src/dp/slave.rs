@@ -23,6 +23,7 @@
 //!
 //! Source: EN 50170-2. The slave belongs to one device, whose own rules come in through [`Application`].
 
+use alloc::borrow::Cow;
 use core::fmt;
 
 use crate::dp::ms1::{Answer, Records, Server};
@@ -99,14 +100,14 @@ pub trait Application: Records {
 }
 
 /// What a slave is, for good.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Identity {
     /// Station address.
     pub address: Address,
     /// Ident_Number.
     pub ident: u16,
     /// The one configuration it accepts, as in Chk_Cfg.
-    pub config: &'static [u8],
+    pub config: Cow<'static, [u8]>,
     /// Output octets (from the master).
     pub outputs: u8,
     /// Input octets (to the master).
@@ -187,7 +188,7 @@ impl Slave {
 
     /// The supply came on: everything from before is forgotten, initialisation takes no time.
     pub fn power_on(&mut self, now: Local, app: &mut impl Application, out: &mut Outbox) {
-        *self = Self::new(self.identity);
+        *self = Self::new(self.identity.clone());
         self.enter(SlaveState::WaitPrm, SlaveCause::Initialised, now, app, out);
     }
     /// [`Timer::Watchdog`] came due.
@@ -224,7 +225,7 @@ impl Slave {
             (None, None) => self.data_exchange(request, app, out),
             (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, out),
             (Some(Sap::GET_CFG), Some(Sap::MASTER_MS0)) => {
-                let config = self.identity.config;
+                let config = &self.identity.config;
                 self.passive.reply(now, Status::Dl, config.len(), out, |du| du.copy_from_slice(config));
             }
             (Some(Sap::SET_PRM), Some(Sap::MASTER_MS0)) => self.set_prm(now, header.sa, du, app, out),
@@ -354,7 +355,7 @@ impl Slave {
             return self.refuse(now, out);
         }
         self.passive.acknowledge(now, out);
-        if du != self.identity.config {
+        if *du != *self.identity.config {
             self.fail(DiagStatus::CFG_FAULT, SlaveCause::CfgFault, now, app, out);
         } else if self.state == SlaveState::WaitCfg {
             self.enter(SlaveState::DataExch, SlaveCause::Configured, now, app, out);
