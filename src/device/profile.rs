@@ -49,10 +49,32 @@ pub struct Profile {
     pub publisher: bool,
     /// Whether it can receive other slaves' inputs.
     pub subscriber: bool,
+    /// What it takes as a subscriber.
+    pub dxb: DxbLimits,
     /// Whether an empty Data_Exchange means Clear to it.
     pub fail_safe: bool,
     /// Where all this comes from.
     pub source: &'static str,
+}
+
+/// What a subscriber takes (GSD keywords DXB_Max_Link_Count, DXB_Max_Data_Length).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct DxbLimits {
+    /// Entries of both tables together, at most [`DxbLimits::MOST_LINKS`].
+    pub links: u8,
+    /// Longest sample, and the data area of each slot (octets).
+    pub data: u8,
+    /// Slots with a data area for the subscriber table, numbered from 1.
+    pub slots: u8,
+}
+
+impl DxbLimits {
+    /// Most links of a subscriber (VPC3+C manual).
+    pub const MOST_LINKS: u8 = 29;
+    /// No subscriber.
+    pub const NONE: Self = Self { links: 0, data: 0, slots: 0 };
+    /// All that the ASIC allows. Model: two slots, so that samples can go to one or the other.
+    pub const FULL: Self = Self { links: Self::MOST_LINKS, data: 244, slots: 2 };
 }
 
 impl Profile {
@@ -108,6 +130,7 @@ const ENCODER: Profile = Profile {
     revolutions: 4_096,
     publisher: true,
     subscriber: false,
+    dxb: DxbLimits::NONE,
     fail_safe: true,
     source: "",
 };
@@ -144,7 +167,18 @@ pub const PROFILES: &[Profile] = &[
         config: &[0xC3, 0xC1, 0xC5, 0xFD, 0x00, 0x00],
         publisher: false,
         subscriber: true,
-        source: "Model: D24",
+        dxb: DxbLimits::FULL,
+        source: "Model: D24; links as VPC3+C",
+        ..ENCODER
+    },
+    Profile {
+        name: "coupled-drive",
+        title: "generic DP-V2 slave that follows a publisher and publishes what it follows",
+        ident: 0xF0D1,
+        config: &[0xC3, 0xC1, 0xC5, 0xFD, 0x00, 0x00],
+        subscriber: true,
+        dxb: DxbLimits::FULL,
+        source: "Model: subscriber-drive (D24) with the publisher function, for chains of slaves",
         ..ENCODER
     },
 ];
@@ -185,7 +219,9 @@ mod tests {
             assert_eq!(find(profile.name), Some(profile));
             assert!(!profile.title.is_empty() && !profile.source.is_empty() && profile.ident != 0, "{}", profile.name);
             assert!(profile.t_dp_min.is_multiple_of(profile.dp_grid()), "{}", profile.name);
-            assert!(profile.publisher != profile.subscriber, "{}", profile.name);
+            assert!(profile.publisher || profile.subscriber, "{}", profile.name);
+            assert_eq!(profile.subscriber, profile.dxb != DxbLimits::NONE, "{}", profile.name);
+            assert!(profile.dxb.links <= DxbLimits::MOST_LINKS, "{}", profile.name);
         }
         assert_eq!(find("posital"), None);
     }

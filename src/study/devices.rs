@@ -53,7 +53,7 @@ pub fn full(name: &str) -> Result<String, UnknownDevice> {
     lines.extend(aligned(&rates().collect::<Vec<_>>(), &[], &[max_tsdr(profile).collect()]));
 
     lines.push(String::new());
-    if profile.publisher {
+    if !profile.subscriber {
         lines.push("acyclic parameters, all read-only (manual 4)".to_owned());
         let rows: Vec<_> = PARAMETERS.iter().flat_map(parameter_rows).collect();
         lines.extend(aligned(&["number", "name", "format"], &[0, 1, 2], &rows));

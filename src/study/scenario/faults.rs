@@ -584,8 +584,8 @@ good.toml:34:10: link.1.length: a sample of 4 octets from octet 10 on is not in 
 good.toml:37:14: link.2.subscriber: slave 11 has this publisher already
   37 | subscriber = 11
      |              ^^
-  rule: one link per publisher and subscriber (Model: D26 counts latencies by this pair)
-  help: one link whose sample holds both
+  rule: one link per publisher, subscriber and table (Model: D26 counts latencies by the pair)
+  help: one link with both: samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]
 ",
         ),
     ]);
@@ -835,7 +835,7 @@ fn a_good_file_becomes_a_scenario() {
     assert_eq!(scenario.slaves[0].crystal, Crystal::Within(50_000));
     assert_eq!(scenario.slaves[0].motion, Motion::Speed { start: Angle::ZERO, micro_rpm: 1_500_000_000 });
     let (publisher, subscriber) = (address(3), address(11));
-    assert_eq!(scenario.links, [Link { publisher, subscriber, offset: 4, length: 4 }]);
+    assert_eq!(scenario.links, [Link::of(publisher, subscriber, 4, 4)]);
     let action = Action::HoldLifeSign { cycles: Some(2) };
     assert_eq!(scenario.events, [Event { when: When::Time(Span::from_s(1)), slaves: vec![publisher], action }]);
     let bursts = Bursts { from_cycle: 1_000, count: 1, every: Some(100) };
