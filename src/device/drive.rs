@@ -25,7 +25,8 @@ use crate::fdl::{Outbox, Timer};
 use crate::observation::{LinkState, Observation};
 use crate::time::{Local, Span};
 use crate::wire::Address;
-use crate::wire::link_status::{LinkStatus, LinkStatusBlock};
+use crate::wire::diag::DiagBuffer;
+use crate::wire::link_status::LinkStatus;
 use crate::wire::prm::SetPrm;
 
 /// A slave with the subscriber function.
@@ -48,6 +49,8 @@ pub struct Subscriber {
     /// Whether [`Timer::Links`] is armed. It comes no later than any link is due.
     armed: bool,
     publishers: u128,
+    /// Number of the diagnosis.
+    revision: u32,
 }
 
 /// How a link is.
@@ -96,6 +99,7 @@ impl Subscriber {
             watching: false,
             armed: false,
             publishers: 0,
+            revision: 0,
         }
     }
     /// What the link table brought, its samples one behind the other; zeros before the first.
@@ -108,20 +112,22 @@ impl Subscriber {
     }
     /// How the link to `publisher` is; none without one.
     pub fn status(&self, publisher: Address) -> Option<LinkStatus> {
-        let mut all = self.links.iter().zip(&self.conditions);
-        all.find(|(link, _)| link.publisher == publisher).map(|(_, condition)| condition.status())
+        self.statuses().find(|(of, _)| *of == publisher).map(|(_, status)| status)
     }
-    /// What the diagnosis says: all links, if one of them is overdue or has another length. Model: the block is about the
-    /// device as a whole, slot 0.
-    pub fn link_status(&self) -> Option<LinkStatusBlock> {
-        if !self.conditions.iter().any(|condition| condition.is_told()) {
-            return None;
+    /// How each link is, in the order of the tables.
+    pub fn statuses(&self) -> impl Iterator<Item = (Address, LinkStatus)> {
+        self.links.iter().zip(&self.conditions).map(|(link, condition)| (link.publisher, condition.status()))
+    }
+    /// Whether the diagnosis tells of links: one of them is overdue or has another length.
+    fn tells(&self) -> bool {
+        self.conditions.iter().any(|condition| condition.is_told())
+    }
+    /// Link `index` is not as it was: if the diagnosis tells of links before or after, it is another one now.
+    fn changed(&mut self, index: usize, before: Condition) {
+        let seen = |condition: Condition| (condition.status(), condition.is_told());
+        if seen(before) != seen(self.conditions[index]) && (before.is_told() || self.tells()) {
+            self.revision = self.revision.wrapping_add(1);
         }
-        let mut block = LinkStatusBlock::new(0);
-        for (link, condition) in self.links.iter().zip(&self.conditions) {
-            block.push(link.publisher, condition.status());
-        }
-        Some(block)
     }
 
     /// The position that a link brings: its first sample, of a longer one the first four octets (Model: D24).
@@ -177,10 +183,12 @@ impl Function for Subscriber {
     }
     fn monitor(&mut self, now: Local, out: &mut Outbox) {
         let Some(time) = self.monitoring else { return };
-        for (link, condition) in self.links.iter().zip(&mut self.conditions) {
-            if !condition.overdue && now - condition.heard >= time {
-                condition.overdue = true;
-                condition.enter(link.publisher, LinkState::Lost, out);
+        for index in 0..self.conditions.len() {
+            let (publisher, before) = (self.links.link(index).publisher, self.conditions[index]);
+            if !before.overdue && now - before.heard >= time {
+                self.conditions[index].overdue = true;
+                self.conditions[index].enter(publisher, LinkState::Lost, out);
+                self.changed(index, before);
             }
         }
         self.arm(out);
@@ -195,6 +203,7 @@ impl Function for Subscriber {
     fn published(&mut self, now: Local, publisher: Address, du: &[u8], out: &mut Outbox) {
         let Some(index) = self.links.iter().position(|link| link.publisher == publisher) else { return };
         let (link, condition) = (self.links.link(index), &mut self.conditions[index]);
+        let before = *condition;
         (condition.heard, condition.overdue) = (now, false);
         if du.len() == usize::from(link.length) {
             for Sample { from, to } in self.links.samples(link) {
@@ -207,6 +216,7 @@ impl Function for Subscriber {
             condition.enter(publisher, LinkState::LengthError, out);
             out.observe(Observation::WrongLength { publisher, length: du.len() as u8 });
         }
+        self.changed(index, before);
         if self.watching && !self.armed {
             self.arm(out);
         }
@@ -214,10 +224,22 @@ impl Function for Subscriber {
     fn publishers(&self) -> u128 {
         self.publishers
     }
+    /// Model: the block is about the device as a whole, slot 0, specifier 0, and holds all links as soon as one of them
+    /// does not work. That is something wrong, so Ext_Diag is set.
+    fn diagnosis(&self, diagnosis: &mut DiagBuffer) {
+        if self.tells() {
+            diagnosis.set_ext_diag();
+            diagnosis.link_status(0, 0, self.statuses().map(|(publisher, status)| (publisher, status.0)));
+        }
+    }
+    fn diagnosis_revision(&self) -> u32 {
+        self.revision
+    }
     fn leave(&mut self, out: &mut Outbox) {
         if core::mem::take(&mut self.armed) {
             out.disarm(Timer::Links);
         }
+        self.revision = self.revision.wrapping_add(self.tells().into());
         self.links = Links::default();
         self.conditions.clear();
         self.data.clear();
