@@ -297,6 +297,30 @@ pub enum Observation {
         /// Octets 1 to 3.
         status: [u8; 3],
     },
+    /// A slave's diagnosis has extended blocks, or others than before.
+    ExtendedDiagnosis {
+        /// Whose.
+        slave: Address,
+        /// All their octets.
+        length: u8,
+        /// The first of them, zero where there are fewer.
+        first: [u8; 8],
+    },
+    /// A slave replied with high priority (DH): its diagnosis is read in the next cycle.
+    DiagnosisDue {
+        /// Which.
+        slave: Address,
+    },
+    /// The master sends the slaves a command that is no mode.
+    Control {
+        /// Octets 1 and 2 of Global_Control.
+        octets: [u8; 2],
+    },
+    /// The master goes back to Clear: a slave was without Data_Exchange for Data_Control_Time (Error_Action_Flag).
+    AutoClear {
+        /// Which.
+        slave: Address,
+    },
     /// A GAP poll and what it found.
     Gap {
         /// The polled address.
@@ -559,6 +583,18 @@ impl fmt::Display for Observation {
             Self::Diagnosis { slave, status: [a, b, c] } => {
                 write!(f, "slave {slave}: diagnosis {a:02X} {b:02X} {c:02X}")
             }
+            Self::ExtendedDiagnosis { slave, length, first } => {
+                write!(f, "slave {slave}: extended diagnosis of {length} octets")?;
+                let shown = usize::from(*length).min(first.len());
+                first[..shown]
+                    .iter()
+                    .enumerate()
+                    .try_for_each(|(i, octet)| write!(f, "{}{octet:02X}", if i == 0 { ": " } else { " " }))?;
+                if shown < usize::from(*length) { f.write_str(" ...") } else { Ok(()) }
+            }
+            Self::DiagnosisDue { slave } => write!(f, "slave {slave}: reply of high priority, its diagnosis is due"),
+            Self::Control { octets: [command, groups] } => write!(f, "Global_Control {command:02X} {groups:02X}"),
+            Self::AutoClear { slave } => write!(f, "slave {slave}: no Data_Exchange for Data_Control_Time, AutoClear"),
             Self::Gap { address, answer } => write!(f, "GAP {address}: {answer}"),
             Self::TokenClaimed => f.write_str("token claimed"),
             Self::SlaveLife { slave, from, to, tripped } => {

@@ -8,6 +8,7 @@ use crate::dp::master::{Master, Order};
 use crate::fdl::{Filter, Input, Outbox, Station};
 use crate::observation::MasterMode;
 use crate::wire::Address;
+use crate::wire::control::GlobalControl;
 
 /// What a scenario may order a node to do.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -16,6 +17,8 @@ pub enum Command {
     Mode(MasterMode),
     /// A slave is started anew with a changed telegram.
     Patch(Address, StartupTelegram, Patch),
+    /// Sync, Freeze and their ends, to the master.
+    Control(GlobalControl),
     /// Something for the master's application.
     Application(ControllerCommand),
 }
@@ -59,6 +62,7 @@ impl Station for Node {
                 let input = input.map_command(|command| match command {
                     Command::Mode(mode) => Some(Order::Mode(mode)),
                     Command::Patch(slave, telegram, patch) => Some(Order::Patch(slave, telegram, patch)),
+                    Command::Control(control) => Some(Order::Control(control)),
                     Command::Application(command) => Some(Order::Application(command)),
                 });
                 if let Some(input) = input {

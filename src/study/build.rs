@@ -6,6 +6,7 @@ use crate::device::encoder::{Disc, Encoder};
 use crate::device::node::{Command, Node};
 use crate::device::options::Resolution;
 use crate::device::unit::UnitSettings;
+use crate::dp::CLOCK_GROUP;
 use crate::dp::handler::SlaveParams;
 use crate::dp::iso::Rearm;
 use crate::dp::master::{Master, Settings};
@@ -26,8 +27,6 @@ use crate::wire::prm::{
     DpV1Status, DxbLink, DxbSubscription, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81,
 };
 
-/// Group 8, the clock's (Set_Prm octet 7).
-const CLOCK_GROUP: u8 = 0x80;
 /// A station's clock shows anything up to this when the run begins: clocks need not agree.
 const CLOCK_START: Span = Span::from_s(1);
 /// Data_Control_Time, where the master's watchdog does not set it.
@@ -43,13 +42,17 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
     // A publisher's listeners need the time of an idle line (Model: D27).
     let min_tsdr = if publisher { bus.t_id1() } else { bus.min_tsdr };
     let watchdog = scenario.master.watchdog;
+    let services = slave.services;
     let prm = SetPrm {
-        status: (StationStatus::LOCK).with(StationStatus::WD_ON, watchdog.is_some()),
+        status: (StationStatus::LOCK)
+            .with(StationStatus::SYNC, services.sync)
+            .with(StationStatus::FREEZE, services.freeze)
+            .with(StationStatus::WD_ON, watchdog.is_some()),
         wd_fact_1: watchdog.map_or(1, |watchdog| watchdog.factor_1),
         wd_fact_2: watchdog.map_or(1, |watchdog| watchdog.factor_2),
         min_tsdr: min_tsdr.0 as u8,
         ident: slave.device.ident,
-        group: CLOCK_GROUP,
+        group: CLOCK_GROUP | services.groups,
         dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::ISOM_REQ | DpV1Status::PRM_STRUCTURE)
             .with(DpV1Status::FAIL_SAFE, slave.device.fail_safe)
             .with(DpV1Status::PUBLISHER_ENABLE, publisher),
@@ -129,6 +132,8 @@ pub fn slave_params(scenario: &Scenario, slave: &Slave) -> SlaveParams {
         publisher: scenario.publishes(slave.address),
         fail_safe: slave.device.fail_safe,
         get_cfg: scenario.master.get_cfg,
+        max_diag: slave.device.max_diag,
+        min_interval: slave.min_slave_interval(),
     }
 }
 
@@ -174,12 +179,19 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         lost_after: master.lost_after.min(u16::MAX.into()) as u16,
         clear_for: master.clear_for,
         active_spare: master.active_spare,
-        data_control_time: master.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
+        data_control_time: data_control_time(master),
+        auto_clear: master.services.auto_clear,
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
     let life = LifeSettings { t_mapc: master.t_mapc, start: master.life_start, delay: master.life_delay };
     let addresses = slaves.iter().map(|slave| slave.address);
     Master::new(settings, Controller::new(addresses, life))
+}
+
+/// The scenario's, else the time after which slaves without a master clear their outputs, so that both sides agree.
+fn data_control_time(master: &scenario::Master) -> Span {
+    let watchdog = || master.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span);
+    master.services.data_control_time.unwrap_or_else(watchdog)
 }
 
 fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
@@ -243,6 +255,7 @@ fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Ac
         }
         Action::Clear => vec![(master, Act::Command(Command::Mode(MasterMode::Clear)))],
         Action::Operate => vec![(master, Act::Command(Command::Mode(MasterMode::Operate)))],
+        Action::Control(control) => vec![(master, Act::Command(Command::Control(control)))],
         Action::Acknowledge => for_slaves(&controller::Command::Acknowledge),
         Action::HoldLifeSign { cycles } => for_slaves(&|slave| controller::Command::HoldLife(slave, cycles)),
         Action::ReleaseLifeSign => for_slaves(&controller::Command::ReleaseLife),

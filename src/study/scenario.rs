@@ -14,6 +14,7 @@ mod link;
 mod options;
 mod read;
 mod section;
+mod services;
 mod tree;
 
 pub use error::{Fault, Position, Problem, ScenarioError};
@@ -28,9 +29,11 @@ use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
+use crate::wire::control::GlobalControl;
 pub use crate::wire::parameter::Format;
 use section::Reader;
 pub(super) use section::suggestion;
+pub use services::{MasterServices, SlaveServices};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -250,6 +253,8 @@ pub struct Master {
     pub life_delay: u32,
     /// Whether further tokens to itself fill the spare time (Model: D6).
     pub active_spare: bool,
+    /// How it watches and tells its slaves.
+    pub services: MasterServices,
 }
 
 /// How far a crystal is off its nominal frequency (10^-9), positive is fast.
@@ -321,6 +326,8 @@ pub struct Slave {
     pub silent: bool,
     /// When its supply comes on (true time).
     pub powered_at: Span,
+    /// What it is parameterised for besides Data_Exchange.
+    pub services: SlaveServices,
     /// Where it differs from the model's defaults (Model: D11, D12, D14 to D16, D18, D21).
     pub options: UnitOptions,
 }
@@ -440,6 +447,8 @@ pub enum Action {
     Clear,
     /// The master changes to Operate.
     Operate,
+    /// The master sends Sync, Freeze or their ends to these groups.
+    Control(GlobalControl),
 }
 
 /// What a run keeps.
@@ -504,6 +513,7 @@ pub(crate) mod tests {
             scaling: None,
             silent: false,
             powered_at: Span::ZERO,
+            services: SlaveServices::default(),
             options: UnitOptions::default(),
         };
         Scenario {
@@ -527,6 +537,7 @@ pub(crate) mod tests {
                 life_start: 1,
                 life_delay: 0,
                 active_spare: false,
+                services: MasterServices::default(),
             },
             slaves: (3..3 + n).map(slave).collect(),
             links: Vec::new(),

@@ -249,6 +249,21 @@ fn reply_codes(run: &Run, slave: u8) -> Vec<(Time, u8)> {
     run.telegrams.iter().filter_map(|(start, .., octets)| Some((*start, reply(octets)?))).collect()
 }
 
+/// Extended diagnosis of `slave` as its master read it from `from` on: its length and first octets.
+fn diagnoses(run: &Run, slave: u8, from: Time) -> Vec<(u8, [u8; 8])> {
+    let read = |what: &Observation| match *what {
+        Observation::ExtendedDiagnosis { slave: of, length, first } if of == address(slave) => Some((length, first)),
+        _ => None,
+    };
+    run.events_of(2).filter(|row| row.at >= from).filter_map(|row| read(&row.what)).collect()
+}
+/// What slaves 10 and 11 say while slave 3 is lost: the link table's publisher before the subscriber table's.
+fn told(subscriber: u8) -> (u8, [u8; 8]) {
+    let pairs = if subscriber == 10 { [3, 0x01, 4, 0x81] } else { [4, 0x81, 3, 0x01] };
+    let [a, b, c, d] = pairs;
+    (8, [8, 0x83, 0, 0, a, b, c, d])
+}
+
 #[test]
 fn dxb_lost_publisher() {
     let network = scenario("dxb-lost-publisher", &[]);
@@ -274,6 +289,10 @@ fn dxb_lost_publisher() {
         let after = |at: Time| codes.iter().find(|&&(start, _)| start > at).expect("a reply").1;
         let before = |at: Time| codes.iter().rfind(|&&(start, _)| start < at).expect("a reply").1;
         assert_eq!([before(lost), after(lost), after(back)], [0x08, 0x0A, 0x0A], "slave {subscriber}");
+        // Read in the acyclic part of the next cycle, or of the one after: two slaves ask at once.
+        let high = codes.iter().filter(|&&(start, code)| start > off && code == 0x0A).count();
+        assert!((2 * 2..=2 * 3).contains(&high), "{high} replies of high priority");
+        assert_eq!(diagnoses(&run, subscriber, off), [told(subscriber), (0, [0; 8])], "slave {subscriber}");
         let counts = run.counts.as_ref().expect("the run is over");
         let link = run::layout(&network).link(address(3), address(subscriber)).expect("a link");
         let link = &counts.links[link];
@@ -296,6 +315,9 @@ fn assert_wrong_length(network: &Scenario, run: &Run) {
     let heard = receptions(run, 5, 12).len() as u64;
     assert_eq!((counts.links[link].valid, counts.links[link].longest_gap), (0, None));
     assert_eq!((counts.links[link].length_errors, counts.links[link].lost), (heard, 0), "as often as slave 5 is heard");
+    // Its master learns of it in the start-up, of slave 5 as soon as that one publishes.
+    let told = diagnoses(run, 12, Time::ZERO);
+    assert_eq!(told.last(), Some(&(8, [8, 0x83, 0, 0, 4, 0x40, 5, 0x81])), "{told:02X?}");
     // The length stands in its Set_Prm.
     let prm = build::set_prm(network, network.slave(address(12)).expect("a slave"));
     let block = SetPrm::parse(&prm).expect("a Set_Prm").blocks().last().expect("a block").expect("a good one");

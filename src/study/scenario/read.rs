@@ -5,6 +5,7 @@ use super::kinds::{self, ACTIONS, DISTURBANCES, Kind, address};
 use super::link::link;
 use super::options;
 use super::section::{Reader, Section, choice, cycle_time, instant, number, quantity, suggestion, text, yes};
+use super::services;
 use super::tree::{Node, Place, Table, Value};
 use super::{
     Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Master, Record, Run, Scaling, Scenario,
@@ -321,6 +322,7 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
     let life_start = s.optional(reader, "life_start", number(1..=15)).unwrap_or(1);
     let life_delay = s.optional(reader, "life_delay", number(0..=u32::MAX)).unwrap_or(0);
     let active_spare = s.optional(reader, "active_spare", yes).unwrap_or(false);
+    let services = services::master(s, reader);
     section.finish(reader);
     let (address, t_dp) = (address?, t_dp?);
     let master = Master {
@@ -339,6 +341,7 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
         life_start,
         life_delay,
         active_spare,
+        services,
     };
     Some((master, times))
 }
@@ -439,6 +442,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let functions = s.optional(reader, "functions", yes).unwrap_or(scaling.is_some());
     let silent = s.optional(reader, "silent", yes).unwrap_or(false);
     let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
+    let services = services::slave(s, reader);
     section.finish(reader);
     let times = iso_times(reader, from, own.or(context.times), context.times.is_some());
     let (device, bus) = (device?, context.bus?);
@@ -457,6 +461,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
         scaling,
         silent,
         powered_at,
+        services,
         options,
     })
 }
