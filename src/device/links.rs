@@ -15,7 +15,7 @@ use crate::wire::prm::{Block, BlockType, DxbLink, DxbLinks, DxbSubscriptions, Se
 /// The links of a subscriber, each of one publisher.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Links {
-    links: Vec<Link>,
+    by_publisher: Vec<Link>,
     /// Of every link, those of one link behind each other.
     samples: Vec<Sample>,
     /// Octets of all areas.
@@ -90,28 +90,28 @@ impl Links {
             samples.push((link, Sample { from: from..from + length, to: to..to + length }));
         }
         for (of, _) in &samples {
-            if all.links.iter().any(|link| link.publisher.get() == of.publisher) {
+            if all.by_publisher.iter().any(|link| link.publisher.get() == of.publisher) {
                 continue;
             }
             let begin = all.samples.len();
             let own = samples.iter().filter(|(link, _)| link.publisher == of.publisher);
             all.samples.extend(own.map(|(_, sample)| sample.clone()));
             let publisher = Address::new(of.publisher).expect("a checked publisher");
-            all.links.push(Link { publisher, length: of.length, samples: begin..all.samples.len() });
+            all.by_publisher.push(Link { publisher, length: of.length, samples: begin..all.samples.len() });
         }
         all
     }
 
     /// The links in the order in which their publishers are named first.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &Link> {
-        self.links.iter()
+        self.by_publisher.iter()
     }
     /// The link of this number among [`iter`](Self::iter).
     ///
     /// # Panics
     /// If there are fewer.
     pub fn link(&self, index: usize) -> &Link {
-        &self.links[index]
+        &self.by_publisher[index]
     }
     /// The samples of a link, in the order of the tables.
     pub fn samples(&self, link: &Link) -> &[Sample] {

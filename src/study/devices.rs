@@ -53,12 +53,12 @@ pub fn full(name: &str) -> Result<String, UnknownDevice> {
     lines.extend(aligned(&rates().collect::<Vec<_>>(), &[], &[max_tsdr(profile).collect()]));
 
     lines.push(String::new());
-    if !profile.subscriber {
+    if profile.subscriber {
+        lines.push("no acyclic parameters".to_owned());
+    } else {
         lines.push("acyclic parameters, all read-only (manual 4)".to_owned());
         let rows: Vec<_> = PARAMETERS.iter().flat_map(parameter_rows).collect();
         lines.extend(aligned(&["number", "name", "format"], &[0, 1, 2], &rows));
-    } else {
-        lines.push("no acyclic parameters".to_owned());
     }
     Ok(text(&lines))
 }
