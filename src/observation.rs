@@ -162,7 +162,7 @@ named! {
 named! {
     /// State of a slave-to-slave link in the subscriber (Model: D27).
     LinkState {
-        /// Nothing valid came yet, or not for the watchdog time.
+        /// Nothing came yet, or not for the watchdog time.
         Lost = "lost",
         /// Valid data came within the watchdog time.
         Active = "active",
@@ -537,6 +537,13 @@ pub enum Observation {
         /// Whose.
         publisher: Address,
     },
+    /// A publisher's reply came with another length than parameterised and was not taken over.
+    WrongLength {
+        /// Whose.
+        publisher: Address,
+        /// Its length (octets).
+        length: u8,
+    },
     /// A subscriber used a publisher's value at its T_O.
     Used {
         /// Whose.
@@ -600,6 +607,7 @@ impl Observation {
                 | Self::Latch { .. }
                 | Self::SetPoint { expected: true, .. }
                 | Self::Subscribed { .. }
+                | Self::WrongLength { .. }
                 | Self::Used { .. }
                 | Self::Gap { .. }
                 | Self::TokenReceived { .. }
@@ -609,6 +617,7 @@ impl Observation {
 
 /// One line in the field's words.
 impl fmt::Display for Observation {
+    #[allow(clippy::too_many_lines)] // A line or two for each observation.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::CycleStart { cycle, .. } => write!(f, "cycle {cycle} starts"),
@@ -687,6 +696,9 @@ impl fmt::Display for Observation {
             Self::Leds { from, to } => write!(f, "LEDs red/green {from} -> {to}"),
             Self::Power { on } => write!(f, "supply {}", if *on { "on" } else { "off" }),
             Self::Subscribed { publisher } => write!(f, "data of publisher {publisher}"),
+            Self::WrongLength { publisher, length } => {
+                write!(f, "{length} octets of publisher {publisher}, wrong length")
+            }
             Self::Used { publisher, position } => write!(f, "position {position} of publisher {publisher} used"),
             Self::Link { publisher, from, to } => write!(f, "link to {publisher}: {from} -> {to}"),
             Self::Collision { with } => write!(f, "collision with {with}"),

@@ -149,11 +149,14 @@ pub enum Timer {
     SetPoint,
     /// The LEDs may change because nothing was heard.
     Leds,
+    /// A slave-to-slave link may be lost (Model: D27).
+    Links,
 }
 
 impl Timer {
     /// Every timer, in the order of their numbers.
-    pub const ALL: [Self; 6] = [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint, Self::Leds];
+    pub const ALL: [Self; 7] =
+        [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint, Self::Leds, Self::Links];
 }
 
 /// A station's answer to one input. Reused from step to step, so that no step allocates.
@@ -163,7 +166,7 @@ pub struct Outbox {
     send: Option<Send>,
     /// What becomes of the deadlines; an entry counts if its bit in `ordered` is set.
     orders: [Order; Self::DEADLINES],
-    ordered: u8,
+    ordered: u16,
     sample_with_telegrams: Option<bool>,
     observations: [Option<Observation>; Self::MAX_OBSERVATIONS],
     observed: usize,

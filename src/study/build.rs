@@ -23,7 +23,9 @@ use crate::time::{Local, Span, Time};
 use crate::wire::Address;
 use crate::wire::drive::G1Stw;
 use crate::wire::parameter::ParameterAddress;
-use crate::wire::prm::{DpV1Status, DxbLink, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81};
+use crate::wire::prm::{
+    DpV1Status, DxbLink, DxbSubscription, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81,
+};
 
 /// A station's clock shows anything up to this when the run begins: clocks need not agree.
 const CLOCK_START: Span = Span::from_s(1);
@@ -59,8 +61,9 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
     let builder = PrmBuilder::new(&prm).and_then(|builder| {
         let builder = if slave.device.subscriber { Some(builder) } else { builder.user_81(&user_block(slave)) }?;
         let builder = builder.iso_m(&iso_block(scenario, slave))?;
-        let links = links_to(scenario, slave.address);
-        if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }
+        let (links, subscriptions) = tables_of(scenario, slave.address);
+        let builder = if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }?;
+        if subscriptions.is_empty() { Some(builder) } else { builder.dxb_subscriptions(&subscriptions) }
     });
     builder.expect("a checked scenario fits into Set_Prm").octets().to_vec()
 }
@@ -101,17 +104,21 @@ fn iso_block(scenario: &Scenario, slave: &Slave) -> IsoM {
     }
 }
 
-fn links_to(scenario: &Scenario, subscriber: Address) -> Vec<DxbLink> {
-    let links = scenario.links.iter().filter(|link| link.subscriber == subscriber);
-    let inputs = |publisher| scenario.slave(publisher).map_or(0, |slave| slave.device.inputs);
-    links
-        .map(|link| DxbLink {
-            publisher: link.publisher.get(),
-            length: inputs(link.publisher),
-            offset: link.offset,
-            sample: link.length,
-        })
-        .collect()
+/// The entries that `subscriber` gets: those of the link table and those of the subscriber table.
+fn tables_of(scenario: &Scenario, subscriber: Address) -> (Vec<DxbLink>, Vec<DxbSubscription>) {
+    let (mut links, mut subscriptions) = (Vec::new(), Vec::new());
+    for link in scenario.links.iter().filter(|link| link.subscriber == subscriber) {
+        let inputs = scenario.slave(link.publisher).map_or(0, |slave| slave.device.inputs);
+        let (publisher, length) = (link.publisher.get(), link.publisher_length.unwrap_or(inputs));
+        for sample in &link.samples {
+            let entry = DxbLink { publisher, length, offset: sample.offset, sample: sample.length };
+            match link.slot() {
+                None => links.push(entry),
+                Some(slot) => subscriptions.push(DxbSubscription { link: entry, slot, destination: sample.to }),
+            }
+        }
+    }
+    (links, subscriptions)
 }
 
 /// What the master knows of a slave beforehand.
@@ -195,7 +202,7 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let machine = if slave.silent {
         Node::Silent(slave.address)
     } else if slave.device.subscriber {
-        Node::Drive(Drive::new(&slave.device, settings, Subscriber::default()))
+        Node::Drive(Drive::new(&slave.device, settings, Subscriber::new(&slave.device, slave.address)))
     } else {
         Node::Encoder(Encoder::new(&slave.device, settings, Disc::new(&slave.device, &slave.options)))
     };
@@ -310,5 +317,34 @@ mod tests {
         assert_eq!((publisher[3], publisher[7]), (76, 0xE0), "min T_SDR is T_ID1, Publisher_Enable is set");
         let subscriber = set_prm(&four, &four.slaves[3]);
         assert_eq!(subscriber[10 + IsoM::LEN..], octets("09 03 00 00 01 06 0C 04 04"));
+    }
+
+    #[test]
+    fn a_subscriber_gets_both_tables_with_all_samples() {
+        let more = r#"
+            table = "subscriber"
+            [[link]]
+            publisher = 7
+            subscriber = 9
+            samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]
+            [[link]]
+            publisher = 7
+            subscriber = 9
+            table = "subscriber"
+            slot = 2
+            samples = [{ offset = 8, length = 4, to = 6 }, { offset = 2, length = 2 }]
+            [[link]]
+            publisher = 8
+            subscriber = 9
+            publisher_length = 10
+        "#;
+        let text = [THREE, LINK, more].concat().replace("375 us", "500 us");
+        let four = Scenario::parse("four", "four.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let subscriber = set_prm(&four, &four.slaves[3]);
+        let expected = octets(
+            "11 03 00 00 01 07 0C 04 04 07 0C 00 02 08 0A 04 04 \
+             17 07 00 00 01 06 0C 04 01 00 04 07 0C 08 02 06 04 07 0C 02 02 0A 02",
+        );
+        assert_eq!(subscriber[10 + IsoM::LEN..], expected);
     }
 }

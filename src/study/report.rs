@@ -1,6 +1,6 @@
 //! Report: the summary of a run as text that fits a screen.
 
-use super::summary::{Distribution, LedSummary, LinkSummary, SlaveSummary, Summary};
+use super::summary::{Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, Summary};
 use crate::observation::Leds;
 use crate::time::Span;
 
@@ -148,7 +148,19 @@ fn links(summary: &Summary, lines: &mut Vec<String>) {
         shown.truncate(LINKS);
         shown.sort_by_key(|link| (link.publisher, link.subscriber));
     }
-    let header = ["publish latency", "p50", "p90", "p99", "p99.9", "max", "age at use max"];
+    let header = [
+        "publish latency",
+        "p50",
+        "p90",
+        "p99",
+        "p99.9",
+        "max",
+        "age at use max",
+        "valid",
+        "lost",
+        "wrong length",
+        "longest gap",
+    ];
     let rows: Vec<_> = shown.iter().map(|link| link_cells(link)).collect();
     lines.push(String::new());
     lines.extend(aligned(&header, &[], &rows));
@@ -159,6 +171,8 @@ fn links(summary: &Summary, lines: &mut Vec<String>) {
 
 fn link_cells(link: &LinkSummary) -> Vec<String> {
     let publish = |value: fn(&Distribution) -> Option<Span>| span(link.distribution("publish").and_then(value));
+    let count =
+        |of: fn(&Receptions) -> u64| link.receptions.as_ref().map_or_else(|| "-".to_owned(), |all| of(all).to_string());
     vec![
         format!("{} -> {}", link.publisher, link.subscriber),
         publish(|latency| latency.p50),
@@ -167,6 +181,10 @@ fn link_cells(link: &LinkSummary) -> Vec<String> {
         publish(|latency| latency.p99_9),
         publish(|latency| latency.max),
         span(link.distribution("age").and_then(|age| age.max)),
+        count(|receptions| receptions.valid),
+        count(|receptions| receptions.lost),
+        count(|receptions| receptions.length_errors),
+        span(link.receptions.and_then(|receptions| receptions.longest_gap)),
     ]
 }
 
@@ -255,8 +273,8 @@ LEDs red dark, green dark at slave 3: no supply
 
 latch skew: p50 90 ns, p90 90 ns, p99 90 ns, p99.9 90 ns, max 90 ns, 0.250 steps
 
-publish latency     p50     p90     p99   p99.9     max  age at use max
-         3 -> 5  400 us  400 us  400 us  400 us  400 us          750 us
+publish latency     p50     p90     p99   p99.9     max  age at use max  valid  lost  wrong length  longest gap
+         3 -> 5  400 us  400 us  400 us  400 us  400 us          750 us      0     0             0            -
 
 fingerprint: wire 0123456789abcdef
 2 files in out/sample

@@ -10,6 +10,7 @@ pub mod error;
 #[cfg(test)]
 mod faults;
 pub mod kinds;
+mod link;
 mod options;
 mod read;
 mod section;
@@ -17,6 +18,7 @@ mod services;
 mod tree;
 
 pub use error::{Fault, Position, Problem, ScenarioError};
+pub use link::{Link, Sample, Table};
 
 use crate::device::options::{Resolution, UnitOptions};
 use crate::device::profile::Device;
@@ -366,19 +368,6 @@ pub struct Scaling {
     pub units_per_rev: u32,
     /// Total measuring range (counts), octets 20..=23 (manual 3.2.4).
     pub total_range: u32,
-}
-
-/// One slave-to-slave link (manual 3.4).
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Link {
-    /// Whose inputs.
-    pub publisher: Address,
-    /// Who takes them.
-    pub subscriber: Address,
-    /// Where the sample begins in the publisher's inputs (octets).
-    pub offset: u8,
-    /// Length of the sample (octets).
-    pub length: u8,
 }
 
 /// An order at an instant.

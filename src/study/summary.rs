@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-use super::count::{Counts, SlaveCounts};
+use super::count::{Counts, LinkCounts, SlaveCounts};
 use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
@@ -208,9 +208,32 @@ pub struct LinkSummary {
     pub publisher: u8,
     /// Who takes them.
     pub subscriber: u8,
+    /// How often it worked and how often not; none before [`Summary::show_receptions`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub receptions: Option<Receptions>,
     /// Distributions of the link's quantities, by name.
     #[serde(serialize_with = "map")]
     pub distributions: Vec<(&'static str, Distribution)>,
+}
+
+/// What a subscriber got from one publisher.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct Receptions {
+    /// Valid receptions.
+    pub valid: u64,
+    /// How often nothing came for the watchdog time.
+    pub lost: u64,
+    /// Data of another length than parameterised.
+    pub length_errors: u64,
+    /// Longest true time between two valid receptions.
+    #[serde(rename = "longest_gap_ms", serialize_with = "ms_or_null")]
+    pub longest_gap: Option<Span>,
+}
+
+impl From<&LinkCounts> for Receptions {
+    fn from(&LinkCounts { valid, lost, length_errors, longest_gap, .. }: &LinkCounts) -> Self {
+        Self { valid, lost, length_errors, longest_gap }
+    }
 }
 
 /// A distribution in a few numbers. Percentiles have three significant digits, the rest is exact.
@@ -280,6 +303,7 @@ impl Summary {
         let link = |&(publisher, subscriber): &(Address, Address)| LinkSummary {
             publisher: publisher.get(),
             subscriber: subscriber.get(),
+            receptions: None,
             distributions: distributions(histograms, Subject::Link(publisher, subscriber)),
         };
         Self {
@@ -310,6 +334,14 @@ impl Summary {
     pub fn show_leds(&mut self, counts: &Counts) {
         for (slave, counts) in self.slaves.iter_mut().zip(&counts.slaves) {
             slave.leds = Some(LedSummary::of(counts.leds));
+        }
+    }
+
+    /// Adds what the subscribers received. What becomes of links is in the fingerprint of the states, and the latencies of
+    /// every reception are in that of the statistics, which therefore stays that of the latencies alone.
+    pub fn show_receptions(&mut self, counts: &Counts) {
+        for (link, counts) in self.links.iter_mut().zip(&counts.links) {
+            link.receptions = Some(counts.into());
         }
     }
 

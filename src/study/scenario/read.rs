@@ -2,13 +2,14 @@
 
 use super::error::Fault;
 use super::kinds::{self, ACTIONS, DISTURBANCES, Kind, address};
+use super::link::link;
 use super::options;
 use super::section::{Reader, Section, choice, cycle_time, instant, number, quantity, suggestion, text, yes};
 use super::services;
 use super::tree::{Node, Place, Table, Value};
 use super::{
-    Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Link, Master, Record, Run, Scaling,
-    Scenario, Slave, Watchdog, When,
+    Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Master, Record, Run, Scaling, Scenario,
+    Slave, Watchdog, When,
 };
 use crate::device::profile::{Device, PROFILES, Profile};
 use crate::fdl::params::BusParams;
@@ -505,17 +506,6 @@ fn scaling(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Scaling>
     let total_range = section.required(reader, "total_range", "16777216", number(0..=u32::MAX));
     section.finish(reader);
     Some(Scaling { units_per_rev: units_per_rev?, total_range: total_range? })
-}
-
-/// Reads one `[[link]]`.
-fn link(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Link> {
-    let publisher = section.required(reader, "publisher", "3", address);
-    let subscriber = section.required(reader, "subscriber", "11", address);
-    // G1_XIST1 of telegram 81 (manual 2.2).
-    let offset = section.optional(reader, "offset", number(0..=u8::MAX)).unwrap_or(4);
-    let length = section.optional(reader, "length", number(0..=u8::MAX)).unwrap_or(4);
-    section.finish(reader);
-    Some(Link { publisher: publisher?, subscriber: subscriber?, offset, length })
 }
 
 /// Reads one `[[event]]`; `all` are the addresses of all slaves.
