@@ -7,9 +7,9 @@
 use core::fmt;
 
 use crate::time::{Local, Span};
-use crate::wire::Address;
-use crate::wire::acyclic::ErrorCode;
+use crate::wire::acyclic::{AbortCode, ErrorCode};
 use crate::wire::parameter::{self, ErrorNumber};
+use crate::wire::{Address, Sap};
 
 macro_rules! named {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* }) => {
@@ -203,6 +203,57 @@ named! {
     }
 }
 
+named! {
+    /// State of an MS2 connection, on either side.
+    ConnectionState {
+        /// There is none.
+        Closed = "closed",
+        /// Asked for, not confirmed yet.
+        Opening = "opening",
+        /// Nothing is asked.
+        Open = "open",
+        /// A request waits for its answer.
+        Working = "working",
+        /// Given up, the other side does not know yet.
+        Aborting = "aborting",
+    }
+}
+
+/// Why the state of an MS2 connection changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ConnectionCause {
+    /// The master asked for it.
+    Initiated,
+    /// The slave confirmed it.
+    Confirmed,
+    /// No connection is free, or the slave has closed it.
+    Refused,
+    /// This side gives it up.
+    GaveUp(AbortCode),
+    /// The other side aborted it: octet 3 of the abort, instance and code.
+    Aborted(u8),
+    /// The other side knows of the abort.
+    Told,
+    /// The other side does not ask any more.
+    Silence,
+}
+impl fmt::Display for ConnectionCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Initiated => f.write_str("Initiate"),
+            Self::Confirmed => f.write_str("confirmed"),
+            Self::Refused => f.write_str("refused, SAP closed"),
+            Self::GaveUp(code) => write!(f, "given up, {code}"),
+            Self::Aborted(reason) => match AbortCode::from_code(reason & 0x0F) {
+                Some(code) => write!(f, "aborted by the other side, {code}"),
+                None => write!(f, "aborted by the other side, reason {reason:02X}"),
+            },
+            Self::Told => f.write_str("abort told"),
+            Self::Silence => f.write_str("nothing heard"),
+        }
+    }
+}
+
 /// Why an acyclic request failed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum AcyclicFailure {
@@ -212,6 +263,8 @@ pub enum AcyclicFailure {
     Timeout,
     /// The slave left data exchange.
     Left,
+    /// The connection was aborted, by either side: octet 3 of the abort, instance and code.
+    Aborted(u8),
     /// The slave refused it, with this class and code (DP-V1).
     Refused(ErrorCode),
     /// The answer cannot be read.
@@ -223,6 +276,10 @@ impl fmt::Display for AcyclicFailure {
             Self::Closed => f.write_str("its service access point is closed"),
             Self::Timeout => f.write_str("no answer in time"),
             Self::Left => f.write_str("it left data exchange"),
+            Self::Aborted(reason) => match AbortCode::from_code(reason & 0x0F) {
+                Some(code) => write!(f, "the connection was aborted, {code}"),
+                None => write!(f, "the connection was aborted, reason {reason:02X}"),
+            },
             Self::Refused(code) => write!(f, "refused: {code}"),
             Self::Unreadable => f.write_str("its answer cannot be read"),
         }
@@ -366,6 +423,20 @@ pub enum Observation {
         slave: Address,
         /// Why.
         why: AcyclicFailure,
+    },
+
+    /// An MS2 connection was opened or closed, seen by the slave or by the class 2 master. Its requests are not told.
+    Connection {
+        /// The other side.
+        peer: Address,
+        /// The slave's SAP; 49 before the resource manager has named another.
+        sap: Sap,
+        /// Before.
+        from: ConnectionState,
+        /// Now.
+        to: ConnectionState,
+        /// Why.
+        why: ConnectionCause,
     },
 
     // ----- slave
@@ -565,6 +636,9 @@ impl fmt::Display for Observation {
                 write!(f, "slave {slave}: P{pnu}[{subindex}] error {number:02X}, {name}")
             }
             Self::AcyclicFailed { slave, why } => write!(f, "slave {slave}: acyclic request failed, {why}"),
+            Self::Connection { peer, sap, from, to, why } => {
+                write!(f, "MS2 with {peer} at SAP {sap}: {from} -> {to} ({why})")
+            }
             Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
             Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
             Self::Clock { verdict, error, window, counter, .. } => {

@@ -9,10 +9,8 @@
 //! | any | anything else | the failure is told; the next request |
 
 use alloc::collections::VecDeque;
-use alloc::vec;
-use alloc::vec::Vec;
 
-use crate::dp::ms1::{Failure, Job, MAX_PDU};
+use crate::dp::ms1::{Failure, Job, Pdu};
 use crate::fdl::Outbox;
 use crate::observation::{AcyclicFailure, Observation};
 use crate::wire::Address;
@@ -77,11 +75,11 @@ impl ParameterClient {
         let (asked, stage) = self.running.as_ref()?;
         let pdu = match stage {
             Stage::Written => self.write(asked),
-            Stage::Reading => emit(&Request::Read { record: CHANNEL, len: MAX_ANSWER }),
+            Stage::Reading => Pdu::of(&Request::Read { record: CHANNEL, len: MAX_ANSWER }),
         };
         Some(Job { slave: asked.slave, pdu })
     }
-    fn write(&self, asked: &Asked) -> Vec<u8> {
+    fn write(&self, asked: &Asked) -> Pdu {
         let mut data = [0; MAX_ANSWER as usize];
         let id = if asked.change.is_some() { RequestId::Change } else { RequestId::Read };
         let octets = asked.change.map(|(format, value)| (format, value.to_be_bytes()));
@@ -91,7 +89,7 @@ impl ParameterClient {
         });
         let head = (self.reference, id, 0);
         let len = parameter::emit_request(head, &[asked.parameter], value.as_slice(), &mut data).unwrap_or(0);
-        emit(&Request::Write { record: CHANNEL, data: &data[..len] })
+        Pdu::of(&Request::Write { record: CHANNEL, data: &data[..len] })
     }
 
     /// Takes what became of the job.
@@ -103,6 +101,7 @@ impl ParameterClient {
             Err(Failure::Closed) => return out.observe(failed(AcyclicFailure::Closed)),
             Err(Failure::Timeout) => return out.observe(failed(AcyclicFailure::Timeout)),
             Err(Failure::Left) => return out.observe(failed(AcyclicFailure::Left)),
+            Err(Failure::Aborted(reason)) => return out.observe(failed(AcyclicFailure::Aborted(reason))),
         };
         match (stage, response) {
             (Stage::Written, Ok(Response::Write { .. })) => self.running = Some((asked, Stage::Reading)),
@@ -145,16 +144,11 @@ fn tell(asked: &Asked, data: &[u8], out: &mut Outbox) {
     }
 }
 
-fn emit(request: &Request<'_>) -> Vec<u8> {
-    let mut pdu = vec![0; MAX_PDU];
-    let len = request.emit(&mut pdu).unwrap_or(0);
-    pdu.truncate(len);
-    pdu
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dp::ms1::MAX_PDU;
+    use alloc::vec;
 
     /// What a slave answers is data: also an answer that is far too long for one step.
     #[test]

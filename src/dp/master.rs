@@ -38,8 +38,6 @@ use crate::time::{Local, Span};
 use crate::wire::control::GlobalControl;
 use crate::wire::{Address, Service, Status};
 
-/// C1_Response_Timeout (SIEM80F9.GSE).
-const C1_RESPONSE_TIMEOUT: Span = Span::from_s(10);
 /// Characters of a Global_Control telegram.
 const GC_OCTETS: usize = 13;
 /// Characters of a telegram around its data unit, with and without SAPs.
@@ -101,6 +99,8 @@ pub struct Settings {
     pub active_spare: bool,
     /// Data_Control_Time; the mode is told to the slaves at least every third of it (Model: D5).
     pub data_control_time: Span,
+    /// C1_Response_Timeout, after which an acyclic job is given up; the GSD file counts it in 10 ms.
+    pub ms1_timeout: Span,
     /// The slaves, in the order in which they are polled.
     pub slaves: Vec<SlaveParams>,
 }
@@ -170,7 +170,7 @@ impl<A: Application> Master<A> {
             // Never in every cycle: slaves start up in the acyclic part too.
             control_every: third.div_floor(settings.t_dp).max(2) as u64,
             startup_next: 0,
-            ms1: Client::new(C1_RESPONSE_TIMEOUT),
+            ms1: Client::new(settings.ms1_timeout),
             settings,
         }
     }
@@ -349,6 +349,10 @@ impl<A: Application> Master<A> {
         let count = self.handlers.len();
         let mut slaves = (0..count).map(|i| (self.startup_next + i) % count);
         let starting = slaves.find(|&slave| !self.handlers[slave].exchanges());
+        // Also where the cycle had no time to ask.
+        if let Some(slave) = self.ms1.overdue(now) {
+            self.app.acyclic_done(slave, Err(Failure::Timeout), out);
+        }
         if self.ms1.is_idle()
             && let Some(job) = self.app.acyclic()
         {

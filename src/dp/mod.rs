@@ -4,6 +4,7 @@ pub mod handler;
 pub mod iso;
 pub mod master;
 pub mod ms1;
+pub mod ms2;
 pub mod slave;
 
 use crate::wire::Sap;

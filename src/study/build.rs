@@ -168,6 +168,7 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         clear_for: master.clear_for,
         active_spare: master.active_spare,
         data_control_time: master.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
+        ms1_timeout: master.ms1_timeout,
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
     let life = LifeSettings { t_mapc: master.t_mapc, start: master.life_start, delay: master.life_delay };

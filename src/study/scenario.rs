@@ -5,6 +5,7 @@
 //! and the rules of the bus and of the devices are checked on the whole. What is wrong on the way is collected
 //! into one [`ScenarioError`].
 
+mod acyclic;
 mod check;
 pub mod error;
 #[cfg(test)]
@@ -248,6 +249,8 @@ pub struct Master {
     pub life_delay: u32,
     /// Whether further tokens to itself fill the spare time (Model: D6).
     pub active_spare: bool,
+    /// C1_Response_Timeout, after which an acyclic request over MS1 is given up; a multiple of 10 ms (GSD).
+    pub ms1_timeout: Span,
 }
 
 /// How far a crystal is off its nominal frequency (10^-9), positive is fast.
@@ -538,6 +541,7 @@ pub(crate) mod tests {
                 life_start: 1,
                 life_delay: 0,
                 active_spare: false,
+                ms1_timeout: Span::from_s(10),
             },
             slaves: (3..3 + n).map(slave).collect(),
             links: Vec::new(),

@@ -1,5 +1,6 @@
 //! The tree of a scenario becomes a [`Scenario`], table by table and key by key.
 
+use super::acyclic;
 use super::error::Fault;
 use super::kinds::{self, ACTIONS, DISTURBANCES, Kind, address};
 use super::options;
@@ -320,6 +321,7 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
     let life_start = s.optional(reader, "life_start", number(1..=15)).unwrap_or(1);
     let life_delay = s.optional(reader, "life_delay", number(0..=u32::MAX)).unwrap_or(0);
     let active_spare = s.optional(reader, "active_spare", yes).unwrap_or(false);
+    let ms1_timeout = s.optional(reader, "ms1_timeout", acyclic::timeout).unwrap_or(acyclic::RESPONSE_TIMEOUT);
     section.finish(reader);
     let (address, t_dp) = (address?, t_dp?);
     let master = Master {
@@ -338,6 +340,7 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
         life_start,
         life_delay,
         active_spare,
+        ms1_timeout,
     };
     Some((master, times))
 }
