@@ -219,6 +219,29 @@ named! {
     }
 }
 
+named! {
+    /// Which kind of master asks for an acyclic service.
+    MasterClass {
+        /// It parameterises its slaves and exchanges data with them.
+        One = "class 1",
+        /// A tool for commissioning and service.
+        Two = "class 2",
+    }
+}
+named! {
+    /// How an acyclic service ended.
+    AcyclicResult {
+        /// The slave did it.
+        Positive = "positive",
+        /// The slave answered that it does not.
+        Negative = "negative",
+        /// Nothing that ends it came in time.
+        Timeout = "time-out",
+        /// Its connection was refused, aborted or closed.
+        Broken = "connection lost",
+    }
+}
+
 /// Why the state of an MS2 connection changed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ConnectionCause {
@@ -425,6 +448,17 @@ pub enum Observation {
         why: AcyclicFailure,
     },
 
+    /// An acyclic service is over: a PDU and its answer, or the repeated polls for it, or one read of DP-V0.
+    AcyclicDone {
+        /// Of whom it was asked.
+        slave: Address,
+        /// By which kind of master.
+        class: MasterClass,
+        /// How it ended.
+        result: AcyclicResult,
+        /// From its beginning at the master to here.
+        took: Span,
+    },
     /// An MS2 connection was opened or closed, seen by the slave or by the class 2 master. Its requests are not told.
     Connection {
         /// The other side.
@@ -448,6 +482,13 @@ pub enum Observation {
         to: SlaveState,
         /// Why.
         cause: SlaveCause,
+    },
+    /// Sync or Freeze mode of a slave changed.
+    Held {
+        /// Outputs wait for Sync.
+        outputs: bool,
+        /// Inputs are held.
+        inputs: bool,
     },
     /// A start-up phase was entered.
     Phase {
@@ -594,6 +635,7 @@ impl Observation {
                 | Self::SetPoint { expected: true, .. }
                 | Self::Subscribed { .. }
                 | Self::Used { .. }
+                | Self::AcyclicDone { .. }
                 | Self::Gap { .. }
         )
     }
@@ -636,10 +678,17 @@ impl fmt::Display for Observation {
                 write!(f, "slave {slave}: P{pnu}[{subindex}] error {number:02X}, {name}")
             }
             Self::AcyclicFailed { slave, why } => write!(f, "slave {slave}: acyclic request failed, {why}"),
+            Self::AcyclicDone { slave, class, result, took } => {
+                write!(f, "slave {slave}: acyclic service of {class} {result} after {took}")
+            }
             Self::Connection { peer, sap, from, to, why } => {
                 write!(f, "MS2 with {peer} at SAP {sap}: {from} -> {to} ({why})")
             }
             Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
+            Self::Held { outputs, inputs } => {
+                let word = |on: bool| if on { "on" } else { "off" };
+                write!(f, "Sync mode {}, Freeze mode {}", word(*outputs), word(*inputs))
+            }
             Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
             Self::Clock { verdict, error, window, counter, .. } => {
                 write!(f, "clock {verdict}, error {error}, window {window}, failure counter {counter}")

@@ -6,6 +6,7 @@ use crate::time::{BitRate, Span, Tbit};
 
 /// A kind of slave that a scenario can name.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(clippy::struct_excessive_bools)] // What a GSD file says with a key each.
 pub struct Profile {
     /// The name in scenario files.
     pub name: &'static str,
@@ -51,6 +52,14 @@ pub struct Profile {
     pub subscriber: bool,
     /// Whether an empty Data_Exchange means Clear to it.
     pub fail_safe: bool,
+    /// Whether it takes Sync_Req in Set_Prm: outputs that wait for Sync.
+    pub sync: bool,
+    /// Whether it takes Freeze_Req in Set_Prm: inputs that are held.
+    pub freeze: bool,
+    /// Max_Diag_Data_Len (octets), 6..=244 (manual 5.1).
+    pub max_diag: u8,
+    /// Min_Slave_Intervall, the shortest time between two Data_Exchange with it; GSD files have it in 100 us.
+    pub min_slave_interval: Span,
     /// Where all this comes from.
     pub source: &'static str,
 }
@@ -109,8 +118,17 @@ const ENCODER: Profile = Profile {
     publisher: true,
     subscriber: false,
     fail_safe: true,
+    // The encoder manuals say nothing of Sync and Freeze.
+    sync: false,
+    freeze: false,
+    max_diag: 6,
+    // SIEM80F9.GSE: 1.
+    min_slave_interval: Span::from_us(100),
     source: "",
 };
+
+/// Max_Diag_Data_Len of a subscriber (octets): the standard part and the status of 29 links. Model: D24, VPC3+C.
+const SUBSCRIBER_MAX_DIAG: u8 = 6 + 4 + 2 * 29;
 
 /// Every device, in the order in which lists show them.
 pub const PROFILES: &[Profile] = &[
@@ -133,6 +151,8 @@ pub const PROFILES: &[Profile] = &[
         title: "SIMODRIVE sensor isochron absolute encoder, 13 + 12 bit",
         ident: 0x80F9,
         max_tsdr: fast_max_tsdr(),
+        sync: true,
+        freeze: true,
         source: "SIEM80F9.GSE; times with octet 15 bit 1 and the narrowest window as the encoder manual, 3.2.2, 3.3.8",
         ..ENCODER
     },
@@ -144,6 +164,7 @@ pub const PROFILES: &[Profile] = &[
         config: &[0xC3, 0xC1, 0xC5, 0xFD, 0x00, 0x00],
         publisher: false,
         subscriber: true,
+        max_diag: SUBSCRIBER_MAX_DIAG,
         source: "Model: D24",
         ..ENCODER
     },

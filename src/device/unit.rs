@@ -21,6 +21,7 @@ use crate::observation::{self, Leds, Observation, Phase, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::Address;
 use crate::wire::acyclic::{ErrorCode, Record};
+use crate::wire::diag::DiagBuffer;
 use crate::wire::drive::{G1Zsw, Inputs81, Outputs81, SensorFault, Zsw2};
 use crate::wire::prm::{Block, BlockType, IsoM, SetPrm};
 
@@ -62,6 +63,12 @@ pub trait Function {
     }
     /// Data exchange is over.
     fn leave(&mut self, _out: &mut Outbox) {}
+    /// Writes the device's own part of the diagnosis.
+    fn diagnosis(&self, _diagnosis: &mut DiagBuffer) {}
+    /// Another number than before whenever [`diagnosis`](Self::diagnosis) writes something else.
+    fn diagnosis_revision(&self) -> u32 {
+        0
+    }
 }
 
 /// What is set at a unit, not by its master.
@@ -124,6 +131,9 @@ impl<F: Function> Unit<F> {
             inputs: profile.inputs,
             fail_safe: profile.fail_safe,
             publisher: profile.publisher,
+            sync: profile.sync,
+            freeze: profile.freeze,
+            max_diag: profile.max_diag,
             rate: settings.rate,
             t_sdr: settings.t_sdr,
             ms2: ms2::Settings {
@@ -401,6 +411,19 @@ impl<F: Function> Application for Body<F> {
             self.latch(sample, false, out);
         }
     }
+    fn transfer(&mut self, _now: Local, outputs: Option<&[u8]>, out: &mut Outbox) {
+        self.outputs = outputs.and_then(Outputs81::parse).unwrap_or_default();
+        // Once the clock is locked, T_O takes them over.
+        if !self.is_locked() {
+            self.take_over(out);
+        }
+    }
+    fn freeze(&mut self, _now: Local, sample: u32, out: &mut Outbox) {
+        // Once the clock is locked, what is held was latched at T_I.
+        if !self.is_locked() {
+            self.latch(sample, false, out);
+        }
+    }
     fn inputs(&self, du: &mut [u8]) {
         du.copy_from_slice(&self.inputs.emit());
     }
@@ -418,6 +441,12 @@ impl<F: Function> Application for Body<F> {
     }
     fn publishers(&self) -> u128 {
         self.function.publishers()
+    }
+    fn diagnosis(&self, diagnosis: &mut DiagBuffer) {
+        self.function.diagnosis(diagnosis);
+    }
+    fn diagnosis_revision(&self) -> u32 {
+        self.function.diagnosis_revision()
     }
 }
 

@@ -29,11 +29,11 @@ use alloc::vec::Vec;
 use crate::dp::GLOBAL_CONTROL;
 use crate::dp::handler::{Answer, Handler, Patch, SlaveParams, StartupTelegram};
 use crate::dp::iso::{CycleClock, Rearm};
-use crate::dp::ms1::{Client, Failure, Job, MS1, Progress};
+use crate::dp::ms1::{self, Client, Failure, Job, MS1, Progress};
 use crate::fdl::active::{Active, Confirm, Request};
 use crate::fdl::params::BusParams;
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
-use crate::observation::{MasterMode, Observation};
+use crate::observation::{MasterClass, MasterMode, Observation};
 use crate::time::{Local, Span};
 use crate::wire::control::GlobalControl;
 use crate::wire::{Address, Service, Status};
@@ -350,8 +350,9 @@ impl<A: Application> Master<A> {
         let mut slaves = (0..count).map(|i| (self.startup_next + i) % count);
         let starting = slaves.find(|&slave| !self.handlers[slave].exchanges());
         // Also where the cycle had no time to ask.
+        let since = self.ms1.since().unwrap_or(now);
         if let Some(slave) = self.ms1.overdue(now) {
-            self.app.acyclic_done(slave, Err(Failure::Timeout), out);
+            self.acyclic_done((now - since, slave), Err(Failure::Timeout), out);
         }
         if self.ms1.is_idle()
             && let Some(job) = self.app.acyclic()
@@ -382,11 +383,18 @@ impl<A: Application> Master<A> {
             Confirm::Reply { status, .. } => Err(Some(status)),
             _ => Err(None),
         };
+        let since = self.ms1.since().unwrap_or(now);
         match self.ms1.answered(now, answer) {
             Progress::Going => {}
-            Progress::Done { slave, pdu } => self.app.acyclic_done(slave, Ok(pdu), out),
-            Progress::Failed { slave, why } => self.app.acyclic_done(slave, Err(why), out),
+            Progress::Done { slave, pdu } => self.acyclic_done((now - since, slave), Ok(pdu), out),
+            Progress::Failed { slave, why } => self.acyclic_done((now - since, slave), Err(why), out),
         }
+    }
+    /// An acyclic job is over after `took`.
+    fn acyclic_done(&mut self, (took, slave): (Span, usize), answer: Result<&[u8], Failure>, out: &mut Outbox) {
+        let (address, class) = (self.handlers[slave].params().address, MasterClass::One);
+        out.observe(Observation::AcyclicDone { slave: address, class, result: ms1::result(answer), took });
+        self.app.acyclic_done(slave, answer, out);
     }
     /// How often a request of `octets` characters with an answer of up to `reply` may be repeated before the next
     /// SYNCH; none if it does not fit once.
@@ -445,8 +453,10 @@ impl<A: Application> Master<A> {
     /// A slave is not in data exchange any more.
     fn left(&mut self, slave: usize, out: &mut Outbox) {
         self.app.joined(slave, false, out);
+        let since = self.ms1.since();
         if self.ms1.left(slave) {
-            self.app.acyclic_done(slave, Err(Failure::Left), out);
+            let took = since.map_or(Span::ZERO, |since| (self.exchange_end - since).max(Span::ZERO));
+            self.acyclic_done((took, slave), Err(Failure::Left), out);
         }
     }
 

@@ -17,6 +17,7 @@
 
 use core::fmt;
 
+use crate::observation::AcyclicResult;
 use crate::time::{Local, Span};
 use crate::wire::acyclic::{ErrorCode, Function, Negative, Record, Request, Response};
 use crate::wire::{Sap, Status};
@@ -26,6 +27,8 @@ pub const MS1: (Sap, Sap) = (Sap::MS1, Sap::MASTER_MS1);
 /// Octets of the longest PDU (C1_Max_Data_Len of the encoders and the head of a write).
 pub const MAX_PDU: usize = 244;
 
+/// Bit 7 of the function number of a negative answer.
+const NEGATIVE: u8 = 0x80;
 /// Octets in front of a record's data: function, slot, index, length.
 const RECORD_HEAD: usize = 4;
 
@@ -158,6 +161,16 @@ pub enum Failure {
     Aborted(u8),
 }
 
+/// How a service ended, for who counts.
+pub fn result(answer: Result<&[u8], Failure>) -> AcyclicResult {
+    match answer {
+        Ok([function, ..]) if *function & NEGATIVE != 0 => AcyclicResult::Negative,
+        Ok(_) => AcyclicResult::Positive,
+        Err(Failure::Timeout) => AcyclicResult::Timeout,
+        Err(Failure::Closed | Failure::Left | Failure::Aborted(_)) => AcyclicResult::Broken,
+    }
+}
+
 /// The octets of a PDU, kept without a heap.
 #[derive(Clone, Copy)]
 pub struct Pdu {
@@ -272,6 +285,10 @@ impl Client {
     /// Octets of the longest answer to the job.
     pub fn longest_answer(&self) -> usize {
         self.job.as_ref().map_or(RECORD_HEAD, |(job, _)| job.pdu.longest_answer())
+    }
+    /// When the job began.
+    pub fn since(&self) -> Option<Local> {
+        self.job.as_ref().map(|(_, stage)| stage.since)
     }
     /// The slave of a job whose time is over at `now`; it is given up.
     pub fn overdue(&mut self, now: Local) -> Option<usize> {

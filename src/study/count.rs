@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::acyclic::AcyclicCounts;
 use super::layout::Layout;
 use crate::observation::{ClockVerdict, Leds, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
@@ -14,6 +15,8 @@ pub struct Counts {
     pub network: NetworkCounts,
     /// Per slave, in address order.
     pub slaves: Vec<SlaveCounts>,
+    /// Acyclic services, by the class of the master.
+    pub acyclic: AcyclicCounts,
 }
 
 /// What is counted for the network as a whole.
@@ -89,7 +92,7 @@ impl Counts {
     /// Nothing counted yet.
     pub fn new(layout: &Layout) -> Self {
         let slaves = layout.slaves().iter().map(|slave| SlaveCounts::new(slave.address)).collect();
-        Self { network: NetworkCounts::default(), slaves }
+        Self { network: NetworkCounts::default(), slaves, acyclic: AcyclicCounts::default() }
     }
 
     /// Counts what the master observed; `index` finds a slave.
@@ -122,6 +125,7 @@ impl Counts {
             Observation::Disturbed { .. } => self.network.disturbed += 1,
             _ => {}
         }
+        self.acyclic.station(what);
         self.network.events += u64::from(what.is_event());
     }
 

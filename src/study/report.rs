@@ -1,5 +1,6 @@
 //! Report: the summary of a run as text that fits a screen.
 
+use super::acyclic::AcyclicSummary;
 use super::summary::{Distribution, LedSummary, LinkSummary, SlaveSummary, Summary};
 use crate::observation::Leds;
 use crate::time::Span;
@@ -17,6 +18,7 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     leds(summary, &mut lines);
     spread(summary, &mut lines);
     links(summary, &mut lines);
+    acyclic(summary, &mut lines);
     fingerprint(summary, &mut lines);
     files(summary, dir, &mut lines);
     lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
@@ -168,6 +170,14 @@ fn link_cells(link: &LinkSummary) -> Vec<String> {
         publish(|latency| latency.max),
         span(link.distribution("age").and_then(|age| age.max)),
     ]
+}
+
+/// Acyclic services, a line per class of master.
+fn acyclic(summary: &Summary, lines: &mut Vec<String>) {
+    if !summary.acyclic.is_empty() {
+        lines.push(String::new());
+        lines.extend(summary.acyclic.iter().map(AcyclicSummary::line));
+    }
 }
 
 fn fingerprint(summary: &Summary, lines: &mut Vec<String>) {
