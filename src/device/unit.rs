@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 use crate::device::isochronous::{IsoSettings, Isochronous};
 use crate::device::leds::{LedInput, LedLogic};
 use crate::device::options::UnitOptions;
-use crate::device::profile::Profile;
+use crate::device::profile::Device;
 use crate::device::sensor::{Answer, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
 use crate::dp::ms1::{Access, Records};
 use crate::dp::ms2;
@@ -102,7 +102,7 @@ pub struct Unit<F> {
 /// The unit behind its DP slave.
 #[derive(Clone, Debug)]
 struct Body<F> {
-    profile: &'static Profile,
+    profile: Device,
     settings: UnitSettings,
     iso: Option<Isochronous>,
     sensor: Sensor,
@@ -122,11 +122,12 @@ struct Body<F> {
 
 impl<F: Function> Unit<F> {
     /// A unit of this kind without supply.
-    pub fn new(profile: &'static Profile, settings: UnitSettings, function: F) -> Self {
+    pub fn new(profile: impl Into<Device>, settings: UnitSettings, function: F) -> Self {
+        let profile = profile.into();
         let identity = Identity {
             address: settings.address,
             ident: profile.ident,
-            config: profile.config,
+            config: profile.config.clone(),
             outputs: profile.outputs,
             inputs: profile.inputs,
             fail_safe: profile.fail_safe,

@@ -14,6 +14,10 @@ use crate::wire::Sap;
 pub const SLAVE_DIAG: (Sap, Sap) = (Sap::SLAVE_DIAG, Sap::MASTER_MS0);
 /// Destination and source SAP of Get_Cfg.
 pub const GET_CFG: (Sap, Sap) = (Sap::GET_CFG, Sap::MASTER_MS0);
+/// Destination and source SAP of RD_Inp.
+pub const RD_INP: (Sap, Sap) = (Sap::RD_INP, Sap::MASTER_MS0);
+/// Destination and source SAP of RD_Outp.
+pub const RD_OUTP: (Sap, Sap) = (Sap::RD_OUTP, Sap::MASTER_MS0);
 /// Destination and source SAP of Set_Prm.
 pub const SET_PRM: (Sap, Sap) = (Sap::SET_PRM, Sap::MASTER_MS0);
 /// Destination and source SAP of Chk_Cfg.

@@ -28,6 +28,7 @@
 //! slave's group is selected; what the last two do to data says [`image`](crate::dp::image). Model: a change of
 //! Sync_Mode or Freeze_Mode is a change of the diagnosis like any other.
 
+use alloc::borrow::Cow;
 use core::fmt;
 
 use crate::dp::image::Image;
@@ -118,7 +119,7 @@ pub trait Application: Records {
 }
 
 /// What a slave is, for good.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 #[allow(clippy::struct_excessive_bools)] // What a GSD file says with four keys.
 pub struct Identity {
     /// Station address.
@@ -126,7 +127,7 @@ pub struct Identity {
     /// Ident_Number.
     pub ident: u16,
     /// The one configuration it accepts, as in Chk_Cfg.
-    pub config: &'static [u8],
+    pub config: Cow<'static, [u8]>,
     /// Output octets (from the master).
     pub outputs: u8,
     /// Input octets (to the master).
@@ -195,6 +196,8 @@ impl Slave {
     pub fn new(identity: Identity) -> Self {
         Self {
             passive: Passive::new(identity.address, identity.rate, identity.t_sdr),
+            image: Image::new(identity.outputs, identity.inputs),
+            ms2: Manager::new(identity.ms2),
             identity,
             state: SlaveState::PowerOn,
             master: None,
@@ -205,8 +208,6 @@ impl Slave {
             publisher: false,
             dpv1: false,
             ms1: Server::new(ACYCLIC_TIME, C1_MAX_DATA),
-            ms2: Manager::new(identity.ms2),
-            image: Image::new(identity.outputs, identity.inputs),
             known: Known::default(),
         }
     }
@@ -229,7 +230,7 @@ impl Slave {
 
     /// The supply came on: everything from before is forgotten, initialisation takes no time.
     pub fn power_on(&mut self, now: Local, app: &mut impl Application, out: &mut Outbox) {
-        *self = Self::new(self.identity);
+        *self = Self::new(self.identity.clone());
         for connection in 0..self.identity.ms2.connections {
             app.closed(Access::Ms2(connection));
         }
@@ -271,7 +272,7 @@ impl Slave {
             (None, None) => self.data_exchange(request, app, out),
             (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, header.sa, app, out),
             (Some(Sap::GET_CFG), Some(Sap::MASTER_MS0)) => {
-                let config = self.identity.config;
+                let config = &self.identity.config;
                 self.passive.reply(now, Status::Dl, config.len(), out, |du| du.copy_from_slice(config));
             }
             (Some(Sap::SET_PRM), Some(Sap::MASTER_MS0)) => self.set_prm(now, header.sa, du, app, out),
@@ -436,7 +437,7 @@ impl Slave {
             return self.refuse(now, out);
         }
         self.passive.acknowledge(now, out);
-        if du != self.identity.config {
+        if *du != *self.identity.config {
             self.fail(DiagStatus::CFG_FAULT, SlaveCause::CfgFault, now, app, out);
         } else if self.state == SlaveState::WaitCfg {
             self.enter(SlaveState::DataExch, SlaveCause::Configured, now, app, out);
