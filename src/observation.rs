@@ -186,6 +186,17 @@ named! {
     }
 }
 named! {
+    /// Why an active station left the ring, or lost the token that it held.
+    RingExit {
+        /// The token passed it over twice.
+        Skipped = "passed over twice",
+        /// Another station uses its address.
+        AddressConflict = "another station has its address",
+        /// It heard another station use a token while it held one itself.
+        SecondToken = "a second token",
+    }
+}
+named! {
     /// What the two LEDs in the connection cap show, red/green (manual 5.2).
     Leds {
         /// No supply.
@@ -226,6 +237,23 @@ named! {
         One = "class 1",
         /// A tool for commissioning and service.
         Two = "class 2",
+    }
+}
+named! {
+    /// What a class 2 master reads or writes.
+    AcyclicService {
+        /// The diagnosis.
+        Diagnosis = "Slave_Diag",
+        /// The inputs of a slave.
+        Inputs = "RD_Inp",
+        /// The outputs of a slave.
+        Outputs = "RD_Outp",
+        /// The configuration.
+        Configuration = "Get_Cfg",
+        /// A record over MS2.
+        RecordRead = "Read",
+        /// A record over MS2.
+        RecordWrite = "Write",
     }
 }
 named! {
@@ -377,6 +405,30 @@ pub enum Observation {
         /// Octets 1 to 3.
         status: [u8; 3],
     },
+    /// A slave's diagnosis has extended blocks, or others than before.
+    ExtendedDiagnosis {
+        /// Whose.
+        slave: Address,
+        /// All their octets.
+        length: u8,
+        /// The first of them, zero where there are fewer.
+        first: [u8; 8],
+    },
+    /// A slave replied with high priority (DH): its diagnosis is read in the next cycle.
+    DiagnosisDue {
+        /// Which.
+        slave: Address,
+    },
+    /// The master sends the slaves a command that is no mode.
+    Control {
+        /// Octets 1 and 2 of Global_Control.
+        octets: [u8; 2],
+    },
+    /// The master goes back to Clear: a slave was without Data_Exchange for Data_Control_Time (Error_Action_Flag).
+    AutoClear {
+        /// Which.
+        slave: Address,
+    },
     /// A GAP poll and what it found.
     Gap {
         /// The polled address.
@@ -386,6 +438,42 @@ pub enum Observation {
     },
     /// The token was claimed after T_TO of silence.
     TokenClaimed,
+    /// The token came from another active station.
+    TokenReceived {
+        /// T_RR, real rotation time: since the token came last; zero the first time.
+        t_rr: Span,
+        /// T_TH, what may be used of it; not positive where the token came late.
+        t_th: Span,
+    },
+    /// The token was sent again: nothing was heard of the station it went to.
+    TokenRetry {
+        /// To whom.
+        to: Address,
+    },
+    /// The token was given up while it was held.
+    TokenDropped {
+        /// Why.
+        why: RingExit,
+    },
+    /// This station got its first token: it is in the ring.
+    RingEntered,
+    /// This station left the ring and listens.
+    RingLeft {
+        /// Why.
+        why: RingExit,
+    },
+    /// Another station has this station's address: it keeps away from the line.
+    AddressConflict,
+    /// A GAP poll found an active station that is ready: it is next in the ring.
+    StationJoined {
+        /// Which one.
+        station: Address,
+    },
+    /// An active station did not take the token and is no longer in the ring.
+    StationLost {
+        /// Which one.
+        station: Address,
+    },
     /// The master application's check of one slave's sign of life changed its state (Model: D17).
     SlaveLife {
         /// Whose.
@@ -448,6 +536,19 @@ pub enum Observation {
         why: AcyclicFailure,
     },
 
+    /// What a class 2 master has read from a slave or written to it, but for parameters.
+    AcyclicData {
+        /// The slave.
+        slave: Address,
+        /// By which service.
+        service: AcyclicService,
+        /// Slot and index of a record.
+        record: Option<(u8, u8)>,
+        /// Octets of the data.
+        len: u8,
+        /// The first of them, zero where there are none.
+        head: [u8; 8],
+    },
     /// An acyclic service is over: a PDU and its answer, or the repeated polls for it, or one read of DP-V0.
     AcyclicDone {
         /// Of whom it was asked.
@@ -637,7 +738,61 @@ impl Observation {
                 | Self::Used { .. }
                 | Self::AcyclicDone { .. }
                 | Self::Gap { .. }
+                | Self::TokenReceived { .. }
         )
+    }
+}
+
+impl Observation {
+    /// What is about acyclic services, as text; nothing for anything else.
+    fn fmt_acyclic(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ParameterRequest { slave, pnu, subindex, elements, change } => {
+                let verb = if *change { "change" } else { "read" };
+                write!(f, "slave {slave}: {verb} P{pnu}[{subindex}], {elements} elements, {}", parameter::name(*pnu))
+            }
+            Self::ParameterValue { slave, pnu, subindex, value } => {
+                let element = parameter::element(*pnu, *subindex);
+                write!(f, "slave {slave}: P{pnu}[{subindex}] = {value} ({value:X} hex), {element}")
+            }
+            Self::ParameterError { slave, pnu, subindex, number } => {
+                let name = ErrorNumber::from_code(*number).map_or("error not assigned", ErrorNumber::name);
+                write!(f, "slave {slave}: P{pnu}[{subindex}] error {number:02X}, {name}")
+            }
+            Self::AcyclicFailed { slave, why } => write!(f, "slave {slave}: acyclic request failed, {why}"),
+            Self::AcyclicData { slave, service, record, len, head } => {
+                write!(f, "slave {slave}: {service}")?;
+                if let Some((slot, index)) = record {
+                    write!(f, " slot {slot} index {index}")?;
+                }
+                write!(f, ", {len} octets")?;
+                head.iter().take((*len).into()).try_for_each(|octet| write!(f, " {octet:02X}"))?;
+                if usize::from(*len) > head.len() { f.write_str(" ...") } else { Ok(()) }
+            }
+            Self::AcyclicDone { slave, class, result, took } => {
+                write!(f, "slave {slave}: acyclic service of {class} {result} after {took}")
+            }
+            Self::Connection { peer, sap, from, to, why } => {
+                write!(f, "MS2 with {peer} at SAP {sap}: {from} -> {to} ({why})")
+            }
+            _ => Ok(()),
+        }
+    }
+    /// What happens at the instants of a slave's clock, as text; nothing for anything else.
+    fn fmt_clock(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Clock { verdict, error, window, counter, .. } => {
+                write!(f, "clock {verdict}, error {error}, window {window}, failure counter {counter}")
+            }
+            Self::Latch { locked, inputs } => {
+                write!(f, "latch {} ({})", inputs.xist1, if *locked { "at T_I" } else { "free-running" })
+            }
+            Self::SetPoint { mls, sls, counter, expected } => {
+                let verdict = if *expected { "expected" } else { "NOT EXPECTED" };
+                write!(f, "T_O, master sign of life {mls} {verdict}, own {sls}, failure counter {counter}")
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -657,50 +812,49 @@ impl fmt::Display for Observation {
             Self::Diagnosis { slave, status: [a, b, c] } => {
                 write!(f, "slave {slave}: diagnosis {a:02X} {b:02X} {c:02X}")
             }
+            Self::ExtendedDiagnosis { slave, length, first } => {
+                write!(f, "slave {slave}: extended diagnosis of {length} octets")?;
+                let shown = usize::from(*length).min(first.len());
+                first[..shown]
+                    .iter()
+                    .enumerate()
+                    .try_for_each(|(i, octet)| write!(f, "{}{octet:02X}", if i == 0 { ": " } else { " " }))?;
+                if shown < usize::from(*length) { f.write_str(" ...") } else { Ok(()) }
+            }
+            Self::DiagnosisDue { slave } => write!(f, "slave {slave}: reply of high priority, its diagnosis is due"),
+            Self::Control { octets: [command, groups] } => write!(f, "Global_Control {command:02X} {groups:02X}"),
+            Self::AutoClear { slave } => write!(f, "slave {slave}: no Data_Exchange for Data_Control_Time, AutoClear"),
             Self::Gap { address, answer } => write!(f, "GAP {address}: {answer}"),
             Self::TokenClaimed => f.write_str("token claimed"),
+            Self::TokenReceived { t_rr, t_th } => write!(f, "token received after T_RR {t_rr}, T_TH {t_th}"),
+            Self::TokenRetry { to } => write!(f, "token to {to} repeated"),
+            Self::TokenDropped { why } => write!(f, "token given up: {why}"),
+            Self::RingEntered => f.write_str("entered the ring"),
+            Self::RingLeft { why } => write!(f, "left the ring: {why}"),
+            Self::AddressConflict => f.write_str("another station has this address, offline"),
+            Self::StationJoined { station } => write!(f, "station {station} joins the ring"),
+            Self::StationLost { station } => write!(f, "station {station} took no token and leaves the ring"),
             Self::SlaveLife { slave, from, to, tripped } => {
                 write!(f, "slave {slave}: its sign of life {from} -> {to}{}", if *tripped { ", FAULT" } else { "" })
             }
             Self::MasterLifeHeld { slave, held } => {
                 write!(f, "master sign of life for {slave} {}", if *held { "held" } else { "running" })
             }
-            Self::ParameterRequest { slave, pnu, subindex, elements, change } => {
-                let verb = if *change { "change" } else { "read" };
-                write!(f, "slave {slave}: {verb} P{pnu}[{subindex}], {elements} elements, {}", parameter::name(*pnu))
-            }
-            Self::ParameterValue { slave, pnu, subindex, value } => {
-                let element = parameter::element(*pnu, *subindex);
-                write!(f, "slave {slave}: P{pnu}[{subindex}] = {value} ({value:X} hex), {element}")
-            }
-            Self::ParameterError { slave, pnu, subindex, number } => {
-                let name = ErrorNumber::from_code(*number).map_or("error not assigned", ErrorNumber::name);
-                write!(f, "slave {slave}: P{pnu}[{subindex}] error {number:02X}, {name}")
-            }
-            Self::AcyclicFailed { slave, why } => write!(f, "slave {slave}: acyclic request failed, {why}"),
-            Self::AcyclicDone { slave, class, result, took } => {
-                write!(f, "slave {slave}: acyclic service of {class} {result} after {took}")
-            }
-            Self::Connection { peer, sap, from, to, why } => {
-                write!(f, "MS2 with {peer} at SAP {sap}: {from} -> {to} ({why})")
-            }
+            Self::ParameterRequest { .. }
+            | Self::ParameterValue { .. }
+            | Self::ParameterError { .. }
+            | Self::AcyclicFailed { .. }
+            | Self::AcyclicData { .. }
+            | Self::AcyclicDone { .. }
+            | Self::Connection { .. } => self.fmt_acyclic(f),
             Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
             Self::Held { outputs, inputs } => {
                 let word = |on: bool| if on { "on" } else { "off" };
                 write!(f, "Sync mode {}, Freeze mode {}", word(*outputs), word(*inputs))
             }
             Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
-            Self::Clock { verdict, error, window, counter, .. } => {
-                write!(f, "clock {verdict}, error {error}, window {window}, failure counter {counter}")
-            }
+            Self::Clock { .. } | Self::Latch { .. } | Self::SetPoint { .. } => self.fmt_clock(f),
             Self::Pll { from, to } => write!(f, "PLL {from} -> {to}"),
-            Self::Latch { locked, inputs } => {
-                write!(f, "latch {} ({})", inputs.xist1, if *locked { "at T_I" } else { "free-running" })
-            }
-            Self::SetPoint { mls, sls, counter, expected } => {
-                let verdict = if *expected { "expected" } else { "NOT EXPECTED" };
-                write!(f, "T_O, master sign of life {mls} {verdict}, own {sls}, failure counter {counter}")
-            }
             Self::MasterLife { from, to } => write!(f, "master sign of life {from} -> {to}"),
             Self::Fault { code } => write!(f, "fault {code:04X}"),
             Self::Acknowledged { code } => write!(f, "fault {code:04X} acknowledged"),

@@ -54,4 +54,5 @@ pub mod position;
 pub mod profile;
 pub mod sensor;
 pub mod sign_of_life;
+pub mod tool;
 pub mod unit;

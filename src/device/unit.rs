@@ -26,7 +26,7 @@ use crate::wire::drive::{G1Zsw, Inputs81, Outputs81, SensorFault, Zsw2};
 use crate::wire::prm::{Block, BlockType, IsoM, SetPrm};
 
 /// Profile_Ident_Number of encoders in an MS2 connection.
-const PROFILE_IDENT: u16 = 0x3D00;
+pub const PROFILE_IDENT: u16 = 0x3D00;
 
 /// What one kind of unit does and another does not.
 pub trait Function {

@@ -1,5 +1,6 @@
 //! DP: the services of the master and the slave, their state machines and the isochronous cycle.
 
+pub mod class2;
 pub mod handler;
 pub mod image;
 pub mod iso;
@@ -7,6 +8,7 @@ pub mod master;
 pub mod ms1;
 pub mod ms2;
 pub mod slave;
+pub mod supervision;
 
 use crate::wire::Sap;
 
@@ -24,3 +26,5 @@ pub const SET_PRM: (Sap, Sap) = (Sap::SET_PRM, Sap::MASTER_MS0);
 pub const CHK_CFG: (Sap, Sap) = (Sap::CHK_CFG, Sap::MASTER_MS0);
 /// Destination and source SAP of Global_Control.
 pub const GLOBAL_CONTROL: (Sap, Sap) = (Sap::GLOBAL_CONTROL, Sap::MASTER_MS0);
+/// Group 8, the clock's: bit 7 of Group_Ident (Set_Prm octet 7) and of Group_Select (Global_Control octet 2).
+pub const CLOCK_GROUP: u8 = 0x80;

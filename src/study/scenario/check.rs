@@ -1,9 +1,11 @@
 //! The rules between the keys of a scenario: one function per rule, each of which names the rule with its source, the
 //! numbers, and the nearest right value.
 
+use super::class2;
 use super::error::Fault;
 use super::kinds::jitter_bound;
 use super::section::Reader;
+use super::services;
 use super::tree::Place;
 use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Scenario, Slave, When};
 use crate::device::options::Resolution;
@@ -19,22 +21,24 @@ use crate::wire::Address;
 type Rule = fn(&Facts<'_>, &mut Reader<'_>);
 
 /// What the rules look at.
-struct Facts<'a> {
-    scenario: &'a Scenario,
+pub(super) struct Facts<'a> {
+    pub(super) scenario: &'a Scenario,
     plan: Plan,
 }
 
 /// All rules in stages. A stage takes for granted that the stages before found nothing.
 const STAGES: &[&[Rule]] = &[
     &[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length],
+    &[class2::own_addresses, class2::positions, class2::slaves],
     &[isochronous_rate, bus_parameters, device_max_tsdr, own_t_sdr],
     &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
+    &[services::slave_interval, services::data_control_time, services::sync_and_freeze],
     &[encoder_parameters, resolution],
     &[t_i_grid, t_o_grid, t_i_minimum, t_o_minimum, t_o_maximum, window, delay, least_window],
     &[quantum],
     &[functions, code_sequence, units_per_rev, total_range, jitter_fits, cycles_fit],
     &[publishers, subscribers, samples, link_counts, link_watchdog],
-    &[event_stations, event_instants, disturbance_stations],
+    &[event_stations, event_instants, disturbance_stations, services::commands],
     &[start_up],
 ];
 
@@ -59,7 +63,7 @@ pub(super) fn check(scenario: &Scenario, reader: &mut Reader<'_>) -> Vec<super::
 }
 
 /// Complains about `key`, which stands at its own path or at one of `others`.
-fn about(reader: &mut Reader<'_>, key: &str, others: &[&str], fault: Fault) {
+pub(super) fn about(reader: &mut Reader<'_>, key: &str, others: &[&str], fault: Fault) {
     let place = match reader.place(&[key]) {
         Place::Missing => reader.place(others),
         place => place,
@@ -68,7 +72,7 @@ fn about(reader: &mut Reader<'_>, key: &str, others: &[&str], fault: Fault) {
 }
 
 /// Complains about `key` of `slave`, which may have inherited it from `[master]`.
-fn about_slave(reader: &mut Reader<'_>, slave: &Slave, key: &str, fault: Fault) {
+pub(super) fn about_slave(reader: &mut Reader<'_>, slave: &Slave, key: &str, fault: Fault) {
     let path = format!("slave.{}.{key}", slave.address);
     let address = format!("slave.{}.address", slave.address);
     about(reader, &path, &[&format!("master.{key}"), &address], fault);
@@ -672,7 +676,7 @@ fn start_up(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 impl Action {
     /// Whether an event with this action names slaves.
     pub(super) const fn about_slaves(self) -> bool {
-        !matches!(self, Self::Clear | Self::Operate)
+        !matches!(self, Self::Clear | Self::Operate | Self::Control(_))
     }
 }
 

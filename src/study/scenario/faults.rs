@@ -898,25 +898,83 @@ fn every_kind_can_be_read() {
         assert_eq!(scenario.master.gc_jitter.kind(), kind);
     }
     for kind in kinds::ACTIONS {
-        let about = if ["clear", "operate"].contains(&kind.name) { "" } else { "slaves = \"all\"" };
+        let command = ["sync", "unsync", "freeze", "unfreeze"].contains(&kind.name);
+        let masters = command || ["clear", "operate"].contains(&kind.name);
+        let about = if masters { "" } else { "slaves = \"all\"" };
+        let takes = [("device", "simodrive-sensor-isochron"), ("sync", "true"), ("freeze", "true"), ("groups", "[2]")];
+        let takes = takes.map(|(key, value)| (format!("slave.3.{key}"), value));
+        let sets: Vec<_> = takes.iter().filter(|_| command).map(|(key, value)| (key.as_str(), *value)).collect();
         let value = match kind.name {
             "jump-life-sign" => "to = 9",
             "control-word" => "value = 0x2000",
             "read-parameter" => "parameter = 979\nelements = 6",
             "change-parameter" => "parameter = 918\nvalue = 7",
             "set-prm" => "octets = [[24, 0x05], [16, 255]]\nlength = 58",
+            "sync" | "unfreeze" => "groups = [1, 2]",
             _ => "",
         };
         let event = format!("at = \"1 s\"\ndo = \"{}\"\n{about}\n{value}\n\n[[disturbance]]", kind.name);
         let start = GOOD.find("at = \"1 s\"").unwrap();
         let end = GOOD.find("[[disturbance]]").unwrap();
         let text = [&GOOD[..start], &event, &GOOD[end + "[[disturbance]]".len()..]].concat();
-        let scenario = parse(&text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let scenario = parse(&text, &sets).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(scenario.events[0].slaves.is_empty(), about.is_empty(), "{}", kind.name);
     }
     for kind in kinds::DISTURBANCES {
         good(&[("disturbance.1.kind", kind.name)]);
     }
+}
+
+#[test]
+fn services_that_do_not_fit() {
+    check_sets(&[
+        (
+            "slave.3.sync",
+            "true",
+            r#"
+--set "slave.3.sync=true": slave.3.sync: posital-ocd-dpb1b knows no sync
+  rule: a slave refuses what it does not know with Not_Supported (EN 50170-2, Set_Prm octet 1)
+  help: leave out sync; simodrive-sensor-isochron knows it
+"#,
+        ),
+        (
+            "slave.3.min_slave_interval",
+            "4.1 ms",
+            r#"
+--set "slave.3.min_slave_interval=4.1 ms": slave.3.min_slave_interval: T_DP = 4 ms is too short for slave 3
+  rule: T_DP >= Min_Slave_Interval = 4.1 ms of every slave (GSD, Min_Slave_Intervall in 100 us)
+  help: the shortest is t_dp = "4.125 ms"
+"#,
+        ),
+        (
+            "master.data_control_time",
+            "20 ms",
+            r#"
+--set "master.data_control_time=20 ms": master.data_control_time: a Data_Control_Time of 20 ms is too short
+  rule: Data_Control_Time >= 6 x T_DP = 24 ms: the mode is told every third of it, and not in every cycle (Model: D5)
+  help: data_control_time = "24 ms" or more
+"#,
+        ),
+        (
+            "slave.3.groups",
+            "[1, 8]",
+            r#"
+--set "slave.3.groups=[1, 8]": slave.3.groups: the groups are a list of numbers from 1 to 7
+  rule: group 8 is the clock's (Global_Control octet 2, 00 80 is SYNCH)
+  help: groups = [1, 3]
+"#,
+        ),
+    ]);
+    let event = "at = \"1 s\"\ndo = \"hold-life-sign\"\nslave = 3\nfor = 2";
+    let freeze = "at = \"1 s\"\ndo = \"freeze\"\ngroups = [2]";
+    assert!(said(event, freeze).contains("no slave takes this command"));
+    let text = GOOD.replace(event, freeze);
+    let takes = |group| {
+        let sets =
+            [("slave.3.freeze", "true"), ("slave.3.groups", group), ("slave.3.device", "simodrive-sensor-isochron")];
+        parse(&text, &sets).is_ok()
+    };
+    assert!(takes("[2]") && takes("[1, 2, 7]") && !takes("[1]"));
 }
 
 #[test]
