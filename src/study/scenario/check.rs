@@ -1,6 +1,7 @@
 //! The rules between the keys of a scenario: one function per rule, each of which names the rule with its source, the
 //! numbers, and the nearest right value.
 
+use super::class2;
 use super::error::Fault;
 use super::kinds::jitter_bound;
 use super::section::Reader;
@@ -28,6 +29,7 @@ pub(super) struct Facts<'a> {
 /// All rules in stages. A stage takes for granted that the stages before found nothing.
 const STAGES: &[&[Rule]] = &[
     &[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length],
+    &[class2::own_addresses, class2::positions, class2::slaves],
     &[isochronous_rate, bus_parameters, device_max_tsdr, own_t_sdr],
     &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
     &[services::slave_interval, services::data_control_time, services::sync_and_freeze],
