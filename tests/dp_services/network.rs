@@ -1,6 +1,7 @@
 //! Whole networks: exact telegrams of a diagnosis in operation, the watchdog, intervals, a master that starts over.
 
 use isodp::device::node::{Command, Node};
+use isodp::device::profile::Profile;
 use isodp::observation::{AcyclicFailure, HandlerState, LifeState, MasterMode, Observation, SlaveCause, SlaveState};
 use isodp::sim::network::{Act, Network, NetworkEvent, Until, When};
 use isodp::sim::queue::NearQueue;
@@ -55,6 +56,25 @@ fn a_diagnosis_in_operation_telegram_by_telegram() {
     assert_eq!(cycles[2], [request, "68 0B 0B 68 82 84 08 3E 3C 00 1C 00 02 80 F9 1F 16"]);
     let inputs = |cycle: usize| cycles[cycle][1].split(' ').skip(7).take(12).collect::<Vec<_>>();
     assert_eq!((inputs(1), inputs(3)), (inputs(0), inputs(0)), "held");
+}
+
+/// A device whose diagnosis may be longer than its Data_Exchange is read in the acyclic part, and goes on exchanging.
+#[test]
+fn a_long_diagnosis_takes_no_place_in_the_isochronous_part() {
+    let mut scenario = network(110, "", "", &event(100, "\"freeze\"\ngroups = [2]"));
+    let slave = &mut scenario.slaves[1];
+    slave.device = Profile { max_diag: 62, ..Profile::clone(&slave.device) }.into();
+    let run = Run::of(&scenario);
+    let fcs = |cycle| -> Vec<String> {
+        talk(&run, cycle).iter().map(|text| text.split(' ').nth(6).expect("an FC").to_owned()).collect()
+    };
+    // DH in the reply of cycle 101, Slave_Diag at once behind the last Data_Exchange, DL from there on.
+    let answers = |cycle| fcs(cycle).into_iter().skip(1).step_by(2).collect::<Vec<_>>();
+    assert_eq!([100, 101, 102].map(answers), [vec!["08"], vec!["0A", "08"], vec!["08"]]);
+    assert!(talk(&run, 101)[3].ends_with("00 1C 00 02 80 F9 1F 16"));
+    let t_dx = |cycle: usize| run.cycles[cycle].t_dx.expect("slaves exchange data");
+    assert!((99..108).all(|cycle| t_dx(cycle) == t_dx(99)));
+    assert!(run.slave(4).filter(|row| row.cycle > 90).all(|row| row.life_counter == 0), "no sign of life is missed");
 }
 
 /// What the two slaves are asked for in Set_Prm: octets 1 and 7.
