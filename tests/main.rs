@@ -15,3 +15,4 @@ mod rig;
 mod scenarios;
 mod startup;
 mod support;
+mod topology;

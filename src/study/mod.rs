@@ -18,3 +18,4 @@ pub mod run;
 mod sample;
 pub mod scenario;
 pub mod summary;
+pub mod topology;

@@ -4,8 +4,9 @@
 use super::error::Fault;
 use super::kinds::jitter_bound;
 use super::section::Reader;
+use super::topology;
 use super::tree::Place;
-use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Scenario, Slave, When};
+use super::{Action, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Scenario, Slave, When};
 use crate::device::options::Resolution;
 use crate::sim::motion;
 use crate::sim::noise::GcJitter;
@@ -26,7 +27,7 @@ struct Facts<'a> {
 
 /// All rules in stages. A stage takes for granted that the stages before found nothing.
 const STAGES: &[&[Rule]] = &[
-    &[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length],
+    &[some_slave, own_addresses, addresses_within_hsa, wiring, crystals, run_length],
     &[isochronous_rate, bus_parameters, device_max_tsdr, own_t_sdr],
     &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
     &[encoder_parameters, resolution],
@@ -59,7 +60,7 @@ pub(super) fn check(scenario: &Scenario, reader: &mut Reader<'_>) -> Vec<super::
 }
 
 /// Complains about `key`, which stands at its own path or at one of `others`.
-fn about(reader: &mut Reader<'_>, key: &str, others: &[&str], fault: Fault) {
+pub(super) fn about(reader: &mut Reader<'_>, key: &str, others: &[&str], fault: Fault) {
     let place = match reader.place(&[key]) {
         Place::Missing => reader.place(others),
         place => place,
@@ -105,17 +106,10 @@ fn addresses_within_hsa(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     }
 }
 
-fn positions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let cable = facts.scenario.bus.cable_mm;
-    let slaves = facts.scenario.slaves.iter().map(|s| (s.position_mm, format!("slave.{}.position", s.address)));
-    for (mm, key) in slaves.chain([(facts.scenario.master.position_mm, "master.position".to_owned())]) {
-        if mm > cable {
-            let fault = Fault::new(format!("{} is beyond the end of the cable", metres(mm)))
-                .rule(format!("a station is 0 m to {} along the cable (Model: one line)", metres(cable)))
-                .help(format!("for example under [bus]: cable = \"{}\"", metres(mm)));
-            about(reader, &key, &[], fault);
-        }
-    }
+fn wiring(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    topology::positions(facts.scenario, reader);
+    topology::loads(facts.scenario, reader);
+    topology::jitter(facts.scenario, reader);
 }
 
 fn crystals(facts: &Facts<'_>, reader: &mut Reader<'_>) {
@@ -152,7 +146,7 @@ fn isochronous_rate(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn bus_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let bus = &facts.scenario.bus;
-    if let Err(broken) = bus.params.check(Bus::propagation(bus.cable_mm)) {
+    if let Err(broken) = bus.params.check(facts.scenario.topology.t_td_max()) {
         let help = if broken.min <= broken.max {
             format!("{} to {} with the other bus parameters and the cable", broken.min, broken.max)
         } else {
@@ -706,12 +700,4 @@ fn written(span: Span) -> String {
 /// Whether octet 15 bit 1 is set, in words.
 const fn on_off(slave: &Slave) -> &'static str {
     if slave.functions { "on" } else { "off" }
-}
-
-/// A length as people write it.
-fn metres(mm: u64) -> String {
-    match mm % 1_000 {
-        0 => format!("{} m", mm / 1_000),
-        _ => format!("{mm} mm"),
-    }
 }
