@@ -8,7 +8,9 @@ use isodp::study::plan::Plan;
 use isodp::study::run::run;
 use isodp::study::scenario::Scenario;
 use isodp::time::{Span, Tbit};
+use proptest::prelude::*;
 
+use crate::props::config;
 use crate::support::{Run, address, scenario};
 
 /// The scenarios that are tested here.
@@ -358,4 +360,84 @@ control room: 100 m, 4 of 32 loads
    +--gallery: 60 m, 3 of 32 loads
       |  7, 8: 3.383 us to 3.533 us from the master";
     assert_eq!(outcome.summary.topology.join("\n"), expected);
+}
+
+/// A publisher's reply reaches a subscriber behind the repeater later by the path between the two.
+#[test]
+fn slave_to_slave_goes_across_segments() {
+    let text = two("delay = \"640 ns\"").replace("t_o = \"1 ms\"", "t_o = \"1.25 ms\"");
+    let text = format!(
+        "{text}[[slave]]\naddress = 9\nsegment = \"b\"\nposition = \"30 m\"\ndevice = \"subscriber-drive\"\n[[link]]\npublisher = 3\n\
+         subscriber = 9\n[[link]]\npublisher = 5\nsubscriber = 9\n"
+    );
+    let network = parse(&text);
+    let run = Run::of(&network);
+    no_faults(&network, &run);
+    let reply = network.bus.params.span(Tbit(231));
+    let mut links = 0;
+    for row in run.links.iter().filter(|row| row.cycle >= SETTLED) {
+        assert_eq!(row.wire, reply + network.delay(row.publisher, row.subscriber), "publisher {}", row.publisher);
+        links += 1;
+    }
+    assert!(links > 1_000, "{links}");
+    assert_eq!(network.delay(address(3), address(9)), ns(640.0 + 30.0 * 5.0));
+}
+
+prop_compose! {
+    /// Any tree of segments with jitter on some of its links, and a slave on each.
+    fn tree()(
+        segments in prop::collection::vec((any::<prop::sample::Index>(), 0u32..=100, 0u32..=100, 0u32..40, any::<bool>()), 0..6),
+        cable in 0u32..=100,
+        seed in any::<u64>(),
+    ) -> String {
+        let mut text = format!(
+            "[run]\nseed = {seed}\ncycles = 700\n[bus]\nrate = \"12 Mbit/s\"\n[master]\naddress = 2\nsegment = \"0\"\n\
+             position = \"0 m\"\nt_dp = \"4 ms\"\nt_i = \"125 us\"\nt_o = \"2 ms\"\n[[segment]]\nname = \"0\"\ncable = \"{cable} m\"\n\
+             [[slave]]\naddress = 3\nsegment = \"0\"\ndevice = \"posital-ocd-dpb1b\"\n"
+        );
+        let mut cables = vec![cable];
+        for (index, (on, cable, position, jitter, turned)) in segments.into_iter().enumerate() {
+            let (number, on) = (index + 1, on.index(cables.len()));
+            let at = position.min(cables[on]);
+            cables.push(cable);
+            // A link may be written from either side.
+            let ends = if turned {
+                format!("from = \"{number}\"\nfrom_position = \"0 m\"\nto = \"{on}\"\nto_position = \"{at} m\"")
+            } else {
+                format!("from = \"{on}\"\nfrom_position = \"{at} m\"\nto = \"{number}\"")
+            };
+            let _ = write!(
+                text,
+                "[[segment]]\nname = \"{number}\"\ncable = \"{cable} m\"\n[[repeater]]\n{ends}\njitter = \"{jitter} ns\"\n\
+                 [[slave]]\naddress = {}\nsegment = \"{number}\"\ndevice = \"posital-ocd-dpb1b\"\n",
+                number + 3
+            );
+        }
+        text
+    }
+}
+proptest! {
+    #![proptest_config(config(12))]
+    #[test]
+    fn any_tree_runs_and_every_slave_latches_its_delay_late(text in tree()) {
+        let network = parse(&text);
+        let run = Run::on::<NearQueue<NetworkEvent>>(&network);
+        let heap = Run::on::<HeapQueue<NetworkEvent>>(&network);
+        prop_assert_eq!((run.fingerprint, &run.stations), (heap.fingerprint, &heap.stations));
+        let counts = run.counts.as_ref().expect("counts");
+        prop_assert_eq!((counts.network.collisions, counts.network.late_clocks, counts.network.no_answers), (0, 0, 0));
+        for slave in &counts.slaves {
+            prop_assert_eq!((slave.fault_count(), slave.clock_failures), (0, 0), "slave {}", slave.address);
+            let (master, station) = (network.master.address, slave.address);
+            // What T_TD has more is the jitter of the path (and rounding); the loop makes at most 1.55 of it.
+            let jitter = network.t_td(master, station) - network.delay(master, station);
+            let bound = Span::from_ticks(jitter.ticks() * 155 / 100) + QUANTUM * 3;
+            for offset in offsets(&run, station.get()) {
+                let off = offset - network.delay(master, station);
+                prop_assert!(off.abs() <= bound, "slave {station}: {off} of {bound}");
+            }
+        }
+        let planned = Plan::of(&network).t_dx;
+        prop_assert!(run.cycles.iter().all(|row| row.t_dx.is_none_or(|t_dx| t_dx <= planned)));
+    }
 }

@@ -146,14 +146,18 @@ fn isochronous_rate(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn bus_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let bus = &facts.scenario.bus;
-    if let Err(broken) = bus.params.check(facts.scenario.topology.t_td_max()) {
+    let topology = &facts.scenario.topology;
+    let t_td = topology.t_td_max();
+    if let Err(broken) = bus.params.check(t_td) {
         let help = if broken.min <= broken.max {
             format!("{} to {} with the other bus parameters and the cable", broken.min, broken.max)
         } else {
             "no value fits with the other bus parameters and the cable: change those".to_owned()
         };
+        // A line's delay is its cable's; that of segments is not to be seen in the file.
+        let path = if topology.has_segments() { format!(", T_TD = {t_td} on the longest path") } else { String::new() };
         let fault = Fault::new(format!("{} is not allowed here", broken.value))
-            .rule(format!("{} (EN 50170-2)", broken.rule))
+            .rule(format!("{} (EN 50170-2){path}", broken.rule))
             .help(help);
         about(reader, &format!("bus.{}", broken.name), &["bus.cable", "bus.rate"], fault);
     }
