@@ -1,8 +1,8 @@
-//! The network: stations on a line, and the one loop that makes time pass.
+//! The network: stations on cables, and the one loop that makes time pass.
 //!
 //! Events are ordered by (time, phase, station, number), see [`queue`](super::queue). A telegram's arrivals have its
 //! number on the line, a station's other events are numbered by this station alone. Only the order of numbers matters,
-//! and each random stream belongs to one station, so that a station more or less changes nothing for the others.
+//! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
 use crate::observation::{self, Observation};
