@@ -118,7 +118,9 @@ impl Bus {
         match self.recent.get_mut(self.sent as usize % RECENT) {
             Some(kept) => {
                 (kept.start, kept.end, kept.sender) = (start, end, sender);
-                kept.strays.clone_from(strays);
+                if !strays.is_empty() {
+                    kept.strays.clone_from(strays);
+                }
             }
             None => self.recent.push(Sent { start, end, sender, strays: strays.clone() }),
         }
@@ -151,11 +153,11 @@ impl Bus {
         debug_assert_eq!(self.flights[usize::from(id.0)].listeners, 0);
         self.free.push(id);
     }
-    /// When the telegram's last bit reaches the station `listener`.
+    /// When the telegram's last bit reaches the station `listener`, and the number of the telegram.
     #[inline]
-    pub fn arrival(&self, id: FlightId, listener: usize) -> Time {
+    pub fn arrival(&self, id: FlightId, listener: usize) -> (Time, u64) {
         let flight = self.flight(id);
-        flight.end + self.delays.of(flight.sender, listener, &flight.strays)
+        (flight.end + self.delays.of(flight.sender, listener, &flight.strays), flight.number)
     }
     /// Whether the station `listener` sees characters at `now`.
     pub fn is_busy(&self, now: Time, listener: usize) -> bool {
@@ -208,7 +210,7 @@ mod tests {
         let mut bus = line();
         let (id, _) = bus.send(0, (ns(100), ns(200)), &token());
         assert_eq!([149, 150, 249, 250].map(|t| bus.is_busy(ns(t), 1)), [false, true, true, false]);
-        assert_eq!((bus.arrival(id, 0), bus.arrival(id, 1)), (ns(200), ns(250)));
+        assert_eq!((bus.arrival(id, 0), bus.arrival(id, 1)), ((ns(200), 0), (ns(250), 0)));
         // Forgotten when as many as are kept have followed.
         for _ in 0..RECENT {
             bus.send(1, (ns(1_000), ns(1_100)), &token());
@@ -228,7 +230,7 @@ mod tests {
         for sender in [0, 1, 2].into_iter().cycle().take(300) {
             let start = ns(strays.len() as i64 * 1_000);
             let (id, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token());
-            let delay = |listener| bus.arrival(id, listener) - bus.flight(id).end;
+            let delay = |listener| bus.arrival(id, listener).0 - bus.flight(id).end;
             let stray = expected.draw();
             let behind = Span::from_ns(100) + stray;
             let all = if sender < 2 {
@@ -239,7 +241,7 @@ mod tests {
             assert_eq!([0, 1, 2, 3].map(delay), all);
             let far = if sender < 2 { 3 } else { 0 };
             let tick = Span::from_ticks(1);
-            let seen = [start + behind - tick, start + behind, bus.arrival(id, far) - tick, bus.arrival(id, far)];
+            let seen = [start + behind - tick, start + behind, bus.arrival(id, far).0 - tick, bus.arrival(id, far).0];
             assert_eq!(seen.map(|now| bus.is_busy(now, far)), [false, true, true, false]);
             bus.add_listeners(id, 1);
             bus.heard(id);

@@ -470,7 +470,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// The telegram's end reaches `listener`. Of telegrams that end there at one instant the one sent first comes first.
     fn push_telegram(&mut self, listener: usize, id: FlightId, event: Event) {
-        let (at, number) = (self.bus.arrival(id, listener), self.bus.flight(id).number);
+        let (at, number) = self.bus.arrival(id, listener);
         let key = Key::new(at, Phase::Telegram, self.slots[listener].address.get(), number);
         self.queue.push(key, NetworkEvent(event));
     }
