@@ -17,3 +17,4 @@ mod rig;
 mod scenarios;
 mod startup;
 mod support;
+mod topology;
