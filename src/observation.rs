@@ -186,6 +186,17 @@ named! {
     }
 }
 named! {
+    /// Why an active station left the ring, or lost the token that it held.
+    RingExit {
+        /// The token passed it over twice.
+        Skipped = "passed over twice",
+        /// Another station uses its address.
+        AddressConflict = "another station has its address",
+        /// It heard another station use a token while it held one itself.
+        SecondToken = "a second token",
+    }
+}
+named! {
     /// What the two LEDs in the connection cap show, red/green (manual 5.2).
     Leds {
         /// No supply.
@@ -330,6 +341,42 @@ pub enum Observation {
     },
     /// The token was claimed after T_TO of silence.
     TokenClaimed,
+    /// The token came from another active station.
+    TokenReceived {
+        /// T_RR, real rotation time: since the token came last; zero the first time.
+        t_rr: Span,
+        /// T_TH, what may be used of it; not positive where the token came late.
+        t_th: Span,
+    },
+    /// The token was sent again: nothing was heard of the station it went to.
+    TokenRetry {
+        /// To whom.
+        to: Address,
+    },
+    /// The token was given up while it was held.
+    TokenDropped {
+        /// Why.
+        why: RingExit,
+    },
+    /// This station got its first token: it is in the ring.
+    RingEntered,
+    /// This station left the ring and listens.
+    RingLeft {
+        /// Why.
+        why: RingExit,
+    },
+    /// Another station has this station's address: it keeps away from the line.
+    AddressConflict,
+    /// A GAP poll found an active station that is ready: it is next in the ring.
+    StationJoined {
+        /// Which one.
+        station: Address,
+    },
+    /// An active station did not take the token and is no longer in the ring.
+    StationLost {
+        /// Which one.
+        station: Address,
+    },
     /// The master application's check of one slave's sign of life changed its state (Model: D17).
     SlaveLife {
         /// Whose.
@@ -563,6 +610,7 @@ impl Observation {
                 | Self::WrongLength { .. }
                 | Self::Used { .. }
                 | Self::Gap { .. }
+                | Self::TokenReceived { .. }
         )
     }
 }
@@ -598,6 +646,14 @@ impl fmt::Display for Observation {
             Self::AutoClear { slave } => write!(f, "slave {slave}: no Data_Exchange for Data_Control_Time, AutoClear"),
             Self::Gap { address, answer } => write!(f, "GAP {address}: {answer}"),
             Self::TokenClaimed => f.write_str("token claimed"),
+            Self::TokenReceived { t_rr, t_th } => write!(f, "token received after T_RR {t_rr}, T_TH {t_th}"),
+            Self::TokenRetry { to } => write!(f, "token to {to} repeated"),
+            Self::TokenDropped { why } => write!(f, "token given up: {why}"),
+            Self::RingEntered => f.write_str("entered the ring"),
+            Self::RingLeft { why } => write!(f, "left the ring: {why}"),
+            Self::AddressConflict => f.write_str("another station has this address, offline"),
+            Self::StationJoined { station } => write!(f, "station {station} joins the ring"),
+            Self::StationLost { station } => write!(f, "station {station} took no token and leaves the ring"),
             Self::SlaveLife { slave, from, to, tripped } => {
                 write!(f, "slave {slave}: its sign of life {from} -> {to}{}", if *tripped { ", FAULT" } else { "" })
             }

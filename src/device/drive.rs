@@ -17,8 +17,8 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::device::links::{Link, Links, Sample};
-use crate::device::profile::{DxbLimits, Profile};
+use crate::device::links::{Limits, Link, Links, Sample};
+use crate::device::profile::Profile;
 use crate::device::sensor::Preset;
 use crate::device::unit::{Function, Unit};
 use crate::dp::slave::Refusal;
@@ -30,6 +30,9 @@ use crate::wire::diag::DiagBuffer;
 use crate::wire::link_status::LinkStatus;
 use crate::wire::prm::SetPrm;
 
+/// Most links of a subscriber (VPC3+C).
+pub const MAX_LINKS: usize = 29;
+
 /// A slave with the subscriber function.
 pub type Drive = Unit<Subscriber>;
 
@@ -37,7 +40,7 @@ pub type Drive = Unit<Subscriber>;
 #[derive(Clone, Debug)]
 pub struct Subscriber {
     own: Address,
-    limits: DxbLimits,
+    limits: Limits,
     links: Links,
     /// How each link is, in the order of the links.
     conditions: Vec<Condition>,
@@ -92,7 +95,7 @@ impl Subscriber {
     pub fn new(profile: &Profile, own: Address) -> Self {
         Self {
             own,
-            limits: profile.dxb,
+            limits: Limits::of(profile),
             links: Links::default(),
             conditions: Vec::new(),
             data: Vec::new(),
@@ -102,6 +105,12 @@ impl Subscriber {
             publishers: 0,
             revision: 0,
         }
+    }
+    /// The same, which takes user blocks besides its links, or does not.
+    #[must_use]
+    pub const fn with_user_blocks(mut self, user_blocks: bool) -> Self {
+        self.limits.user_blocks = user_blocks;
+        self
     }
     /// What the link table brought, its samples one behind the other; zeros before the first.
     pub fn link_data(&self) -> &[u8] {

@@ -8,7 +8,7 @@
 use crate::device::isochronous::{IsoSettings, Isochronous};
 use crate::device::leds::{LedInput, LedLogic};
 use crate::device::options::UnitOptions;
-use crate::device::profile::Profile;
+use crate::device::profile::Device;
 use crate::device::sensor::{Answer, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
 use crate::dp::ms1::Records;
 use crate::dp::slave::{Application, Identity, Refusal, Slave};
@@ -99,7 +99,7 @@ pub struct Unit<F> {
 /// The unit behind its DP slave.
 #[derive(Clone, Debug)]
 struct Body<F> {
-    profile: &'static Profile,
+    profile: Device,
     settings: UnitSettings,
     iso: Option<Isochronous>,
     sensor: Sensor,
@@ -118,11 +118,12 @@ struct Body<F> {
 
 impl<F: Function> Unit<F> {
     /// A unit of this kind without supply.
-    pub fn new(profile: &'static Profile, settings: UnitSettings, function: F) -> Self {
+    pub fn new(profile: impl Into<Device>, settings: UnitSettings, function: F) -> Self {
+        let profile = profile.into();
         let identity = Identity {
             address: settings.address,
             ident: profile.ident,
-            config: profile.config,
+            config: profile.config.clone(),
             outputs: profile.outputs,
             inputs: profile.inputs,
             fail_safe: profile.fail_safe,

@@ -500,11 +500,10 @@ impl<A: Application> Master<A> {
 
     fn gap(&mut self, out: &mut Outbox) {
         let due = self.clock.coming().is_multiple_of(self.settings.bus.gap_factor.into());
-        if due && self.fits(self.active.longest_cycle(STATUS_OCTETS, STATUS_OCTETS)) {
-            let address = self.active.poll_gap(self.active.free_at(), out);
-            self.part = Part::Gap(address);
-        } else {
-            self.token(out);
+        let fits = due && self.fits(self.active.longest_cycle(STATUS_OCTETS, STATUS_OCTETS));
+        match fits.then(|| self.active.poll_gap(self.active.free_at(), out)).flatten() {
+            Some(address) => self.part = Part::Gap(address),
+            None => self.token(out),
         }
     }
     fn token(&mut self, out: &mut Outbox) {

@@ -27,6 +27,7 @@
 //! slave's group is selected; what the last two do to data says [`image`](crate::dp::image). Model: a change of
 //! Sync_Mode or Freeze_Mode is a change of the diagnosis like any other.
 
+use alloc::borrow::Cow;
 use core::fmt;
 
 use crate::dp::image::Image;
@@ -114,7 +115,7 @@ pub trait Application: Records {
 }
 
 /// What a slave is, for good.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 #[allow(clippy::struct_excessive_bools)] // What a GSD file says with four keys.
 pub struct Identity {
     /// Station address.
@@ -122,7 +123,7 @@ pub struct Identity {
     /// Ident_Number.
     pub ident: u16,
     /// The one configuration it accepts, as in Chk_Cfg.
-    pub config: &'static [u8],
+    pub config: Cow<'static, [u8]>,
     /// Output octets (from the master).
     pub outputs: u8,
     /// Input octets (to the master).
@@ -188,6 +189,7 @@ impl Slave {
     pub fn new(identity: Identity) -> Self {
         Self {
             passive: Passive::new(identity.address, identity.rate, identity.t_sdr),
+            image: Image::new(identity.outputs, identity.inputs),
             identity,
             state: SlaveState::PowerOn,
             master: None,
@@ -198,7 +200,6 @@ impl Slave {
             publisher: false,
             dpv1: false,
             ms1: Server::new(ACYCLIC_TIME),
-            image: Image::new(identity.outputs, identity.inputs),
             known: Known::default(),
         }
     }
@@ -223,7 +224,7 @@ impl Slave {
 
     /// The supply came on: everything from before is forgotten, initialisation takes no time.
     pub fn power_on(&mut self, now: Local, app: &mut impl Application, out: &mut Outbox) {
-        *self = Self::new(self.identity);
+        *self = Self::new(self.identity.clone());
         self.enter(SlaveState::WaitPrm, SlaveCause::Initialised, now, app, out);
     }
     /// [`Timer::Watchdog`] came due.
@@ -262,7 +263,7 @@ impl Slave {
             (None, None) => self.data_exchange(request, app, out),
             (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, header.sa, app, out),
             (Some(Sap::GET_CFG), Some(Sap::MASTER_MS0)) => {
-                let config = self.identity.config;
+                let config = &self.identity.config;
                 self.passive.reply(now, Status::Dl, config.len(), out, |du| du.copy_from_slice(config));
             }
             (Some(Sap::SET_PRM), Some(Sap::MASTER_MS0)) => self.set_prm(now, header.sa, du, app, out),
@@ -412,7 +413,7 @@ impl Slave {
             return self.refuse(now, out);
         }
         self.passive.acknowledge(now, out);
-        if du != self.identity.config {
+        if *du != *self.identity.config {
             self.fail(DiagStatus::CFG_FAULT, SlaveCause::CfgFault, now, app, out);
         } else if self.state == SlaveState::WaitCfg {
             self.enter(SlaveState::DataExch, SlaveCause::Configured, now, app, out);

@@ -7,6 +7,7 @@
 pub mod active;
 pub mod params;
 pub mod passive;
+pub mod ring;
 
 use crate::observation::Observation;
 use crate::time::{Local, Span};

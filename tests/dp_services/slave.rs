@@ -107,7 +107,7 @@ impl Bench {
         let identity = Identity {
             address: address(OWN),
             ident: 0x1234,
-            config: CFG,
+            config: CFG.into(),
             outputs: 2,
             inputs: 2,
             fail_safe: true,
@@ -297,7 +297,7 @@ fn sync_and_freeze_end_with_data_exchange_and_need_their_request() {
 fn requests_of_a_device_that_has_neither_are_not_supported() {
     for (sync, freeze) in [(false, false), (true, false), (false, true), (true, true)] {
         for (status, good) in [(0x80, true), (0xA0, sync), (0x90, freeze), (0xB0, sync && freeze)] {
-            let identity = Identity { sync, freeze, ..*Bench::exchanging(&PRM).slave.identity() };
+            let identity = Identity { sync, freeze, ..Bench::exchanging(&PRM).slave.identity().clone() };
             let mut bench = Bench::exchanging(&PRM);
             bench.slave = Slave::new(identity);
             bench.slave.power_on(bench.now, &mut bench.device, &mut bench.out);

@@ -7,6 +7,7 @@ use super::section::Reader;
 use super::services;
 use super::tree::Place;
 use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Sample, Scenario, Slave, When};
+use crate::device::links::Limits;
 use crate::device::options::Resolution;
 use crate::sim::motion;
 use crate::sim::noise::GcJitter;
@@ -298,7 +299,7 @@ fn t_i_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 fn t_o_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let t_dx = facts.plan.t_dx_told();
     for slave in facts.scenario.configured() {
-        let min = facts.plan.t_o_min(slave.device);
+        let min = facts.plan.t_o_min(&slave.device);
         if slave.times.t_o < min {
             let t_o_min = slave.device.t_o_min;
             let fault = Fault::new(format!("T_O = {} is too early for slave {}", slave.times.t_o, slave.address))
@@ -317,7 +318,7 @@ fn t_o_maximum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let t_dp = facts.scenario.master.t_dp;
     for slave in facts.scenario.configured() {
         let (times, gap_min) = (&slave.times, slave.device.gap_min(slave.functions));
-        let (min, max) = (facts.plan.t_o_min(slave.device), facts.plan.t_o_max(slave, t_dp));
+        let (min, max) = (facts.plan.t_o_min(&slave.device), facts.plan.t_o_max(slave, t_dp));
         if times.t_o > max {
             let gap = t_dp - times.t_i - times.t_o;
             let message = if gap < Span::ZERO {
@@ -592,11 +593,11 @@ fn all_samples<'a>(facts: &Facts<'a>, reader: &Reader<'_>) -> Vec<(String, &'a L
 }
 
 /// Length of the publisher's data as Set_Prm says it, and who says so.
-fn told_length(facts: &Facts<'_>, link: &Link) -> Option<(u8, &'static str)> {
+fn told_length<'a>(facts: &Facts<'a>, link: &Link) -> Option<(u8, &'a str)> {
     let publisher = facts.scenario.slave(link.publisher)?;
     Some(
         link.publisher_length
-            .map_or((publisher.device.inputs, publisher.device.name), |told| (told, "publisher_length")),
+            .map_or((publisher.device.inputs, &*publisher.device.name), |told| (told, "publisher_length")),
     )
 }
 
@@ -626,7 +627,7 @@ fn number_of(path: &str) -> &str {
 fn sample_lengths(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (path, link, sample) in all_samples(facts, reader) {
         let Some(subscriber) = facts.scenario.slave(link.subscriber) else { continue };
-        let longest = subscriber.device.dxb.data;
+        let longest = Limits::of(&subscriber.device).data;
         if sample.length > longest {
             let fault = Fault::new(format!("slave {} takes no sample of {} octets", link.subscriber, sample.length))
                 .rule(format!("length <= {longest} octets of {} (DXB_Max_Data_Length)", subscriber.device.name));
@@ -640,7 +641,7 @@ fn destinations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let mut taken: Vec<(Address, u8, std::ops::Range<u16>)> = Vec::new();
     for (path, link, sample) in all_samples(facts, reader) {
         let (Some(slot), Some(subscriber)) = (link.slot(), facts.scenario.slave(link.subscriber)) else { continue };
-        let (limits, name) = (subscriber.device.dxb, subscriber.device.name);
+        let (limits, name) = (Limits::of(&subscriber.device), &subscriber.device.name);
         let to = u16::from(sample.to)..u16::from(sample.to) + u16::from(sample.length);
         if slot > limits.slots {
             let fault = Fault::new(format!("slave {} has no slot {slot} for samples", link.subscriber))
@@ -687,12 +688,12 @@ fn told_lengths(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn link_counts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
-        let most = usize::from(slave.device.dxb.links);
+        let most = usize::from(slave.device.max_links);
         let all = all_samples(facts, reader);
         let mut own = all.iter().filter(|(_, link, _)| link.subscriber == slave.address);
         if let Some((path, ..)) = own.nth(most) {
             let fault = Fault::new(format!("slave {} has more than {most} links", slave.address))
-                .rule(format!("a subscriber has up to {most} links, each sample is one (DXB_Max_Link_Count)"));
+                .rule(format!("a subscriber has up to {most} links (GSD: DXB_Max_Link_Count), each sample is one"));
             about(reader, &format!("link.{}.subscriber", number_of(path)), &[], fault);
         }
     }
@@ -776,8 +777,9 @@ impl Action {
 fn shortest_t_dp(facts: &Facts<'_>) -> String {
     let needed = |slave: &Slave| {
         let gap = slave.device.gap_min(slave.functions);
-        let times = facts.plan.t_o_min(slave.device) + gap + slave.times.t_i.max(slave.device.t_i_min(slave.functions));
-        facts.plan.t_dp_min(slave.device).max(times.ceil_to(slave.device.dp_grid()))
+        let times =
+            facts.plan.t_o_min(&slave.device) + gap + slave.times.t_i.max(slave.device.t_i_min(slave.functions));
+        facts.plan.t_dp_min(&slave.device).max(times.ceil_to(slave.device.dp_grid()))
     };
     let shortest = facts.scenario.configured().map(needed).max().unwrap_or_default();
     format!("the shortest is t_dp = \"{shortest}\"")
