@@ -10,15 +10,16 @@
 //! | LengthError | Active | LengthError | Lost, overdue |
 //!
 //! Only valid data are taken, and only those of active links are used; a link that is not active leaves what it brought
-//! last. Model: D27 says "nothing valid"; a publisher that goes on sending another length stays a length error, which says
-//! more than lost. A link that is overdue or has another length is told in the diagnosis until it is active again. Before the
-//! first data of a publisher a link is lost and not yet overdue: publishers start up one after the other (Model: D27).
+//! last. Model: D27 says "nothing valid"; a publisher that goes on sending another length stays a length error, which
+//! says more than lost. A link that is overdue or has another length is told in the diagnosis until it is active again.
+//! Before the first data of a publisher a link is lost and not yet overdue: publishers start up one after the other
+//! (Model: D27).
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::device::links::{Limits, Link, Links, Sample};
-use crate::device::profile::Profile;
+use crate::device::links::{Link, Links, Sample};
+use crate::device::profile::{DxbLimits, Profile};
 use crate::device::sensor::Preset;
 use crate::device::unit::{Function, Unit};
 use crate::dp::slave::Refusal;
@@ -30,9 +31,6 @@ use crate::wire::diag::DiagBuffer;
 use crate::wire::link_status::LinkStatus;
 use crate::wire::prm::SetPrm;
 
-/// Most links of a subscriber (VPC3+C).
-pub const MAX_LINKS: usize = 29;
-
 /// A slave with the subscriber function.
 pub type Drive = Unit<Subscriber>;
 
@@ -40,7 +38,9 @@ pub type Drive = Unit<Subscriber>;
 #[derive(Clone, Debug)]
 pub struct Subscriber {
     own: Address,
-    limits: Limits,
+    limits: DxbLimits,
+    /// Whether it takes user blocks besides its links.
+    user_blocks: bool,
     links: Links,
     /// How each link is, in the order of the links.
     conditions: Vec<Condition>,
@@ -95,7 +95,8 @@ impl Subscriber {
     pub fn new(profile: &Profile, own: Address) -> Self {
         Self {
             own,
-            limits: Limits::of(profile),
+            limits: profile.dxb,
+            user_blocks: false,
             links: Links::default(),
             conditions: Vec::new(),
             data: Vec::new(),
@@ -106,10 +107,11 @@ impl Subscriber {
             revision: 0,
         }
     }
-    /// The same, which takes user blocks besides its links, or does not.
+    /// The same, which takes blocks of user parameters besides its links, or does not. Model: what a manufacturer's user
+    /// parameters do is not known; they do nothing here.
     #[must_use]
     pub const fn with_user_blocks(mut self, user_blocks: bool) -> Self {
-        self.limits.user_blocks = user_blocks;
+        self.user_blocks = user_blocks;
         self
     }
     /// What the link table brought, its samples one behind the other; zeros before the first.
@@ -160,10 +162,10 @@ impl Subscriber {
 
 impl Function for Subscriber {
     fn check(&self, prm: &SetPrm<'_>) -> Result<(), Refusal> {
-        Links::of(prm, self.own, self.limits).map(|_| ())
+        Links::of(prm, self.own, self.limits, self.user_blocks).map(|_| ())
     }
     fn parameterise(&mut self, prm: &SetPrm<'_>, watchdog: Option<Span>) {
-        self.links = Links::of(prm, self.own, self.limits).unwrap_or_default();
+        self.links = Links::of(prm, self.own, self.limits, self.user_blocks).unwrap_or_default();
         self.conditions = vec![Condition::NEW; self.links.iter().len()];
         self.data = vec![0; self.links.octets()];
         self.publishers = self.links.iter().fold(0, |all, link| all | 1 << link.publisher.get());

@@ -7,36 +7,10 @@
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use crate::device::profile::Profile;
+use crate::device::profile::DxbLimits;
 use crate::dp::slave::Refusal;
 use crate::wire::Address;
 use crate::wire::prm::{Block, BlockType, DxbLink, DxbLinks, DxbSubscriptions, SetPrm};
-
-/// What a subscriber takes.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Limits {
-    /// Entries of both tables together (DXB_Max_Link_Count).
-    pub links: u8,
-    /// Longest sample, and the data area of each slot (octets).
-    pub data: u8,
-    /// Slots with a data area for the subscriber table, numbered from 1.
-    pub slots: u8,
-    /// Whether user blocks may be there, which change nothing here. Model: what a manufacturer's user parameters do is
-    /// not known.
-    pub user_blocks: bool,
-}
-
-impl Limits {
-    /// The longest data of a publisher (VPC3+ driver), all of which a subscriber can take, and into each slot.
-    pub const DATA: u8 = 244;
-    /// Model: two slots, so that samples can go to one or the other.
-    pub const SLOTS: u8 = 2;
-
-    /// The limits of a device.
-    pub const fn of(profile: &Profile) -> Self {
-        Self { links: profile.max_links, data: Self::DATA, slots: Self::SLOTS, user_blocks: false }
-    }
-}
 
 /// The links of a subscriber, each of one publisher.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
@@ -82,12 +56,13 @@ struct Entry {
 }
 
 impl Links {
-    /// The links that `prm` asks of the subscriber at `own`, which has these limits.
+    /// The links that `prm` asks of the subscriber at `own`, which has these limits and takes user blocks besides, or
+    /// does not.
     ///
     /// # Errors
     /// The first rule that is broken, with its octet.
-    pub fn of(prm: &SetPrm<'_>, own: Address, limits: Limits) -> Result<Self, Refusal> {
-        let entries = entries(prm, limits)?;
+    pub fn of(prm: &SetPrm<'_>, own: Address, limits: DxbLimits, user_blocks: bool) -> Result<Self, Refusal> {
+        let entries = entries(prm, limits, user_blocks)?;
         for (at, entry) in entries.iter().enumerate() {
             entry.check(own, limits)?;
             entry.check_with(&entries[..at])?;
@@ -98,7 +73,7 @@ impl Links {
         }
         Ok(Self::place(&entries, limits))
     }
-    fn place(entries: &[Entry], limits: Limits) -> Self {
+    fn place(entries: &[Entry], limits: DxbLimits) -> Self {
         let slot = usize::from(limits.data);
         let in_link_table = entries.iter().filter(|entry| entry.place.is_none());
         let first = in_link_table.map(|entry| usize::from(entry.link.sample)).sum();
@@ -160,14 +135,14 @@ impl Links {
 
 /// All entries of both tables in the order of the octets. Each table is there once at most, and nothing else but the
 /// isochronous block.
-fn entries(prm: &SetPrm<'_>, limits: Limits) -> Result<Vec<Entry>, Refusal> {
+fn entries(prm: &SetPrm<'_>, limits: DxbLimits, user_blocks: bool) -> Result<Vec<Entry>, Refusal> {
     let mut all = Vec::new();
     let mut seen: [Option<BlockType>; 2] = [None; 2];
     for block in prm.blocks() {
         let block = block?;
         match block.kind {
             BlockType::IsoM => continue,
-            BlockType::User if limits.user_blocks => continue,
+            BlockType::User if user_blocks => continue,
             BlockType::DxbLinks | BlockType::DxbSubscriptions => {}
             kind => {
                 let rule = "this device takes isochronous, link table and subscriber table blocks only";
@@ -209,7 +184,7 @@ impl Entry {
         self.octet + if self.place.is_some() { 5 } else { 3 }
     }
     /// The rules for one entry: those of any subscriber, then this device's.
-    fn check(&self, own: Address, limits: Limits) -> Result<(), Refusal> {
+    fn check(&self, own: Address, limits: DxbLimits) -> Result<(), Refusal> {
         let link = self.link;
         link.check(self.octet, limits.data).map_err(|mut error| {
             // The sample's length stands elsewhere in the subscriber table.
@@ -261,7 +236,7 @@ mod tests {
     use crate::wire::prm::{DpV1Status, DxbSubscription, PrmBuilder, PrmRule, StationStatus};
 
     const OWN: Address = Address::new(9).unwrap();
-    const LIMITS: Limits = Limits { links: 4, data: 20, slots: 2, user_blocks: false };
+    const LIMITS: DxbLimits = DxbLimits { links: 4, data: 20, slots: 2 };
 
     const fn link(publisher: u8, length: u8, offset: u8, sample: u8) -> DxbLink {
         DxbLink { publisher, length, offset, sample }
@@ -291,7 +266,7 @@ mod tests {
         built.octets().to_vec()
     }
     fn of(du: &[u8]) -> Result<Links, Refusal> {
-        Links::of(&SetPrm::parse(du).unwrap(), OWN, LIMITS)
+        Links::of(&SetPrm::parse(du).unwrap(), OWN, LIMITS, false)
     }
     /// Octet and value of the refusal.
     fn refused(du: &[u8]) -> (usize, u64) {
@@ -377,8 +352,8 @@ mod tests {
         let mut user = octets(&links[..1], &[], true);
         user.extend([4, 0x81, 0, 0]);
         assert_eq!(refused(&user), (21, 0x81));
-        let limits = Limits { user_blocks: true, ..LIMITS };
-        assert!(Links::of(&SetPrm::parse(&user).unwrap(), OWN, limits).is_ok_and(|links| links.iter().len() == 1));
+        let taken = Links::of(&SetPrm::parse(&user).unwrap(), OWN, LIMITS, true);
+        assert!(taken.is_ok_and(|links| links.iter().len() == 1), "a device that takes user blocks");
     }
 
     #[test]

@@ -5,11 +5,14 @@ use crate::device::drive::{Drive, Subscriber};
 use crate::device::encoder::{Disc, Encoder};
 use crate::device::node::{Command, Node};
 use crate::device::options::Resolution;
-use crate::device::unit::UnitSettings;
+use crate::device::tool::{self, Tool};
+use crate::device::unit::{self, UnitSettings};
 use crate::dp::CLOCK_GROUP;
+use crate::dp::class2::{self, Class2};
 use crate::dp::handler::SlaveParams;
 use crate::dp::iso::Rearm;
 use crate::dp::master::{Master, Settings};
+use crate::dp::ms2::{self, client};
 use crate::observation::MasterMode;
 use crate::sim::bus::Place;
 use crate::sim::crystal::Crystal;
@@ -152,6 +155,7 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
         powered_at: Time::ZERO,
     }];
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
+    sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
     let mut network = Network::new(scenario.bus.params.rate, sites, jitter, scenario.disturbances.clone());
     for event in &scenario.events {
@@ -181,6 +185,7 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         active_spare: master.active_spare,
         data_control_time: data_control_time(master),
         auto_clear: master.services.auto_clear,
+        ms1_timeout: master.ms1_timeout,
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
     let life = LifeSettings { t_mapc: master.t_mapc, start: master.life_start, delay: master.life_delay };
@@ -215,6 +220,39 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
         crystal: crystal(scenario.run.seed, slave.address, slave.crystal),
         shaft: Some((shaft, resolution.expect("a checked resolution"))),
         powered_at: Time::ZERO + slave.powered_at,
+    }
+}
+
+/// A class 2 master with its jobs.
+fn class2_site(scenario: &Scenario, class2: &scenario::Class2) -> Site<Node> {
+    let bus = scenario.bus.params;
+    let mut slaves: Vec<Address> = class2.jobs.iter().flat_map(|job| job.slaves.iter().copied()).collect();
+    slaves.sort_unstable();
+    slaves.dedup();
+    let jobs = class2.jobs.iter().flat_map(|job| {
+        let pairs = job.works.iter().flat_map(|work| job.slaves.iter().map(move |slave| (work, slave)));
+        pairs.map(|(work, slave)| tool::Job {
+            slave: slaves.binary_search(slave).expect("a slave of a job"),
+            work: work.clone(),
+            start: job.start,
+            period: job.period,
+        })
+    });
+    let jobs = jobs.collect();
+    let shortest = ms2::TIMEOUT_UNIT * i64::from(ms2::send_timeout(bus.rate));
+    let ms2 = client::Settings {
+        send_timeout: class2.send_timeout.unwrap_or(shortest).div_floor(ms2::TIMEOUT_UNIT) as u16,
+        response_timeout: class2.response_timeout,
+        profile_ident: unit::PROFILE_IDENT,
+    };
+    let settings =
+        class2::Settings { address: class2.address, bus, ms2, per_token: class2.per_token, slaves: slaves.clone() };
+    Site {
+        machine: Node::Class2(Class2::new(settings, Tool::new(slaves, jobs))),
+        place: Place::at(class2.position_mm),
+        crystal: crystal(scenario.run.seed, class2.address, class2.crystal),
+        shaft: None,
+        powered_at: Time::ZERO + class2.powered_at,
     }
 }
 

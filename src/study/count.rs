@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::acyclic::AcyclicCounts;
 use super::layout::Layout;
 use crate::observation::{ClockVerdict, Leds, LinkState, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
@@ -16,6 +17,8 @@ pub struct Counts {
     pub slaves: Vec<SlaveCounts>,
     /// Per link, in the order of the layout.
     pub links: Vec<LinkCounts>,
+    /// Acyclic services, by the class of the master.
+    pub acyclic: AcyclicCounts,
 }
 
 /// What is counted for the network as a whole.
@@ -122,7 +125,12 @@ impl Counts {
     /// Nothing counted yet.
     pub fn new(layout: &Layout) -> Self {
         let slaves = layout.slaves().iter().map(|slave| SlaveCounts::new(slave.address)).collect();
-        Self { network: NetworkCounts::default(), slaves, links: vec![LinkCounts::default(); layout.links().len()] }
+        Self {
+            network: NetworkCounts::default(),
+            slaves,
+            links: vec![LinkCounts::default(); layout.links().len()],
+            acyclic: AcyclicCounts::default(),
+        }
     }
 
     /// Counts what the master observed; `index` finds a slave.
@@ -155,6 +163,7 @@ impl Counts {
             Observation::Disturbed { .. } => self.network.disturbed += 1,
             _ => {}
         }
+        self.acyclic.station(what);
         self.network.events += u64::from(what.is_event());
     }
 

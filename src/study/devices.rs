@@ -2,9 +2,8 @@
 
 use super::report::aligned;
 use super::scenario::suggestion;
-use crate::device::links::Limits;
 use crate::device::parameters::{PARAMETERS, Parameter};
-use crate::device::profile::{self, PROFILES, Profile};
+use crate::device::profile::{self, DxbLimits, PROFILES, Profile};
 use crate::time::{BitRate, Span};
 use crate::wire::parameter;
 
@@ -101,7 +100,7 @@ fn links(profile: &Profile) -> String {
     if !profile.subscriber {
         return "none, it does not subscribe".to_owned();
     }
-    let Limits { links, data, slots, .. } = Limits::of(profile);
+    let DxbLimits { links, data, slots } = profile.dxb;
     format!("up to {links}, samples up to {data} octets; subscriber table: slots 1 to {slots} of {data} octets")
 }
 

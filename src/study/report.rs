@@ -1,5 +1,6 @@
 //! Report: the summary of a run as text that fits a screen.
 
+use super::acyclic::AcyclicSummary;
 use super::summary::{Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, Summary};
 use crate::observation::Leds;
 use crate::time::Span;
@@ -17,6 +18,7 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     leds(summary, &mut lines);
     spread(summary, &mut lines);
     links(summary, &mut lines);
+    acyclic(summary, &mut lines);
     fingerprint(summary, &mut lines);
     files(summary, dir, &mut lines);
     lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
@@ -186,6 +188,14 @@ fn link_cells(link: &LinkSummary) -> Vec<String> {
         count(|receptions| receptions.length_errors),
         span(link.receptions.and_then(|receptions| receptions.longest_gap)),
     ]
+}
+
+/// Acyclic services, a line per class of master.
+fn acyclic(summary: &Summary, lines: &mut Vec<String>) {
+    if !summary.acyclic.is_empty() {
+        lines.push(String::new());
+        lines.extend(summary.acyclic.iter().map(AcyclicSummary::line));
+    }
 }
 
 fn fingerprint(summary: &Summary, lines: &mut Vec<String>) {

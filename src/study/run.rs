@@ -174,6 +174,7 @@ fn conclude(
     summary.fingerprint = texts.map(|(name, hash)| (name.to_owned(), format!("{hash:016x}"))).to_vec();
     summary.show_leds(counts);
     summary.show_receptions(counts);
+    summary.show_acyclic(counts);
 
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {

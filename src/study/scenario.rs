@@ -5,7 +5,9 @@
 //! and the rules of the bus and of the devices are checked on the whole. What is wrong on the way is collected
 //! into one [`ScenarioError`].
 
+mod acyclic;
 mod check;
+mod class2;
 pub mod error;
 #[cfg(test)]
 mod faults;
@@ -17,6 +19,7 @@ mod section;
 mod services;
 mod tree;
 
+pub use class2::{Class2, Class2Job};
 pub use error::{Fault, Position, Problem, ScenarioError};
 pub use link::{Link, Sample, Table};
 
@@ -50,10 +53,12 @@ pub struct Scenario {
     pub run: Run,
     /// The line.
     pub bus: Bus,
-    /// The only master.
+    /// The master of the slaves.
     pub master: Master,
     /// The slaves in address order, which is the order of Data_Exchange (Model: D6).
     pub slaves: Vec<Slave>,
+    /// Class 2 masters in the order of the file.
+    pub class2: Vec<Class2>,
     /// Slave-to-slave links in the order of the file.
     pub links: Vec<Link>,
     /// Orders in the order of the file; at one instant this is the order in which they act.
@@ -253,6 +258,8 @@ pub struct Master {
     pub life_delay: u32,
     /// Whether further tokens to itself fill the spare time (Model: D6).
     pub active_spare: bool,
+    /// C1_Response_Timeout, after which an acyclic request over MS1 is given up; a multiple of 10 ms (GSD).
+    pub ms1_timeout: Span,
     /// How it watches and tells its slaves.
     pub services: MasterServices,
 }
@@ -538,9 +545,11 @@ pub(crate) mod tests {
                 life_start: 1,
                 life_delay: 0,
                 active_spare: false,
+                ms1_timeout: Span::from_s(10),
                 services: MasterServices::default(),
             },
             slaves: (3..3 + n).map(slave).collect(),
+            class2: Vec::new(),
             links: Vec::new(),
             events: Vec::new(),
             disturbances: Vec::new(),

@@ -2,6 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
+use super::acyclic::AcyclicSummary;
 use super::count::{Counts, LinkCounts, SlaveCounts};
 use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
@@ -26,6 +27,9 @@ pub struct Summary {
     pub slaves: Vec<SlaveSummary>,
     /// Per link, by publisher, then subscriber.
     pub links: Vec<LinkSummary>,
+    /// Acyclic services per class of master; none before [`Summary::show_acyclic`].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub acyclic: Vec<AcyclicSummary>,
     /// Name and text of each fingerprint.
     #[serde(serialize_with = "map")]
     pub fingerprint: Vec<(String, String)>,
@@ -312,6 +316,7 @@ impl Summary {
             distributions: distributions(histograms, Subject::Network),
             slaves: (0..facts.slaves.len()).map(|index| slave(index, &facts, counts, histograms)).collect(),
             links: layout.links().iter().map(link).collect(),
+            acyclic: Vec::new(),
             network: Network {
                 scenario: facts.scenario,
                 bit_rate: facts.bit_rate.text(),
@@ -343,6 +348,11 @@ impl Summary {
         for (link, counts) in self.links.iter_mut().zip(&counts.links) {
             link.receptions = Some(counts.into());
         }
+    }
+    /// Adds the acyclic services. All of them are on the line, whose hash is another fingerprint; the hash of all figures
+    /// stays comparable with that of runs before they were counted.
+    pub fn show_acyclic(&mut self, counts: &Counts) {
+        self.acyclic = AcyclicSummary::all(&counts.acyclic);
     }
 
     /// A distribution of the network by the name of its quantity.

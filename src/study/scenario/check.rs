@@ -1,13 +1,13 @@
 //! The rules between the keys of a scenario: one function per rule, each of which names the rule with its source, the
 //! numbers, and the nearest right value.
 
+use super::class2;
 use super::error::Fault;
 use super::kinds::jitter_bound;
 use super::section::Reader;
 use super::services;
 use super::tree::Place;
 use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Sample, Scenario, Slave, When};
-use crate::device::links::Limits;
 use crate::device::options::Resolution;
 use crate::sim::motion;
 use crate::sim::noise::GcJitter;
@@ -29,6 +29,7 @@ pub(super) struct Facts<'a> {
 /// All rules in stages. A stage takes for granted that the stages before found nothing.
 const STAGES: &[&[Rule]] = &[
     &[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length],
+    &[class2::own_addresses, class2::positions, class2::slaves],
     &[isochronous_rate, bus_parameters, device_max_tsdr, own_t_sdr],
     &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
     &[services::slave_interval, services::data_control_time, services::sync_and_freeze],
@@ -627,7 +628,7 @@ fn number_of(path: &str) -> &str {
 fn sample_lengths(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (path, link, sample) in all_samples(facts, reader) {
         let Some(subscriber) = facts.scenario.slave(link.subscriber) else { continue };
-        let longest = Limits::of(&subscriber.device).data;
+        let longest = subscriber.device.dxb.data;
         if sample.length > longest {
             let fault = Fault::new(format!("slave {} takes no sample of {} octets", link.subscriber, sample.length))
                 .rule(format!("length <= {longest} octets of {} (DXB_Max_Data_Length)", subscriber.device.name));
@@ -641,7 +642,7 @@ fn destinations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let mut taken: Vec<(Address, u8, std::ops::Range<u16>)> = Vec::new();
     for (path, link, sample) in all_samples(facts, reader) {
         let (Some(slot), Some(subscriber)) = (link.slot(), facts.scenario.slave(link.subscriber)) else { continue };
-        let (limits, name) = (Limits::of(&subscriber.device), &subscriber.device.name);
+        let (limits, name) = (subscriber.device.dxb, &subscriber.device.name);
         let to = u16::from(sample.to)..u16::from(sample.to) + u16::from(sample.length);
         if slot > limits.slots {
             let fault = Fault::new(format!("slave {} has no slot {slot} for samples", link.subscriber))
@@ -688,7 +689,7 @@ fn told_lengths(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn link_counts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
-        let most = usize::from(slave.device.max_links);
+        let most = usize::from(slave.device.dxb.links);
         let all = all_samples(facts, reader);
         let mut own = all.iter().filter(|(_, link, _)| link.subscriber == slave.address);
         if let Some((path, ..)) = own.nth(most) {
