@@ -694,7 +694,7 @@ fn link_counts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
         let mut own = all.iter().filter(|(_, link, _)| link.subscriber == slave.address);
         if let Some((path, ..)) = own.nth(most) {
             let fault = Fault::new(format!("slave {} has more than {most} links", slave.address))
-                .rule(format!("a subscriber has up to {most} links, each sample is one (DXB_Max_Link_Count)"));
+                .rule(format!("a subscriber has up to {most} links (GSD: DXB_Max_Link_Count), each sample is one"));
             about(reader, &format!("link.{}.subscriber", number_of(path)), &[], fault);
         }
     }
