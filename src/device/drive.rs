@@ -23,10 +23,24 @@ pub type Drive = Unit<Subscriber>;
 /// The subscriber function.
 #[derive(Clone, Debug, Default)]
 pub struct Subscriber {
+    /// Whether it takes user blocks too, which change nothing here.
+    user_blocks: bool,
     links: Vec<Link>,
     /// A link is lost when nothing valid came for this long (Model: D27).
     monitoring: Option<Span>,
     publishers: u128,
+}
+
+impl Subscriber {
+    /// A subscriber that takes blocks of user parameters besides its links, or does not. Model: what a manufacturer's
+    /// user parameters do is not known.
+    pub fn new(user_blocks: bool) -> Self {
+        Self { user_blocks, ..Self::default() }
+    }
+    /// The links of Set_Prm, checked.
+    fn links_of(&self, prm: &SetPrm<'_>) -> Result<Vec<DxbLink>, Refusal> {
+        links(prm, self.user_blocks)
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -51,12 +65,13 @@ impl Link {
 }
 
 /// The links of Set_Prm, checked.
-fn links(prm: &SetPrm<'_>) -> Result<Vec<DxbLink>, Refusal> {
+fn links(prm: &SetPrm<'_>, user_blocks: bool) -> Result<Vec<DxbLink>, Refusal> {
     let mut all = Vec::new();
     for block in prm.blocks() {
         let block = block?;
         match block.kind {
             BlockType::IsoM => {}
+            BlockType::User if user_blocks => {}
             BlockType::DxbLinks => {
                 let table = DxbLinks::parse(&block)?;
                 table.check(MAX_SAMPLE)?;
@@ -77,7 +92,7 @@ fn links(prm: &SetPrm<'_>) -> Result<Vec<DxbLink>, Refusal> {
 
 impl Function for Subscriber {
     fn check(&self, prm: &SetPrm<'_>) -> Result<(), Refusal> {
-        let links = links(prm)?;
+        let links = self.links_of(prm)?;
         if !links.is_empty() && !prm.status.wd_on() {
             let rule = "links need the watchdog, its time monitors them";
             return Err(Refusal::Device { octet: 1, rule, value: prm.status.0.into() });
@@ -86,7 +101,7 @@ impl Function for Subscriber {
     }
     fn parameterise(&mut self, prm: &SetPrm<'_>, watchdog: Option<Span>) {
         let link = |params| Link { params, state: LinkState::Lost, last: Local::ZERO, value: 0 };
-        self.links = links(prm).unwrap_or_default().into_iter().map(link).collect();
+        self.links = self.links_of(prm).unwrap_or_default().into_iter().map(link).collect();
         self.publishers = self.links.iter().fold(0, |all, link| all | 1 << link.params.publisher);
         self.monitoring = watchdog;
     }

@@ -16,6 +16,7 @@ use crate::wire::prm;
 const TELEGRAM_81: &[u8] = &config::TELEGRAM_81;
 
 /// A kind of slave that a scenario can name.
+#[expect(clippy::struct_excessive_bools, reason = "a GSD file's flags")]
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Profile {
     /// The name in scenario files and tables.

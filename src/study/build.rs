@@ -50,16 +50,27 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
         group: CLOCK_GROUP,
         dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::ISOM_REQ | DpV1Status::PRM_STRUCTURE)
             .with(DpV1Status::FAIL_SAFE, slave.device.fail_safe)
-            .with(DpV1Status::PUBLISHER_ENABLE, publisher),
-        blocks: &[],
+            .with(DpV1Status::PUBLISHER_ENABLE, publisher)
+            | preset_status(slave),
+        blocks: preset_blocks(slave),
     };
     let builder = PrmBuilder::new(&prm).and_then(|builder| {
-        let builder = if slave.device.subscriber { Some(builder) } else { builder.user_81(&user_block(slave)) }?;
+        let own = !slave.device.subscriber && preset_blocks(slave).is_empty();
+        let builder = if own { builder.user_81(&user_block(slave)) } else { Some(builder) }?;
         let builder = builder.iso_m(&iso_block(scenario, slave))?;
         let links = links_to(scenario, slave.address);
         if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }
     });
     builder.expect("a checked scenario fits into Set_Prm").octets().to_vec()
+}
+
+/// DPV1_Status as a GSD file presets it.
+fn preset_status(slave: &Slave) -> DpV1Status {
+    slave.user_prm.first_chunk().map_or(DpV1Status::default(), |&octets| DpV1Status::from_octets(octets))
+}
+/// The blocks of a GSD file's user parameters.
+fn preset_blocks(slave: &Slave) -> &[u8] {
+    slave.user_prm.get(3..).unwrap_or_default()
 }
 
 fn user_block(slave: &Slave) -> UserPrm81 {
@@ -183,7 +194,7 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let machine = if slave.silent {
         Node::Silent(slave.address)
     } else if slave.device.subscriber {
-        Node::Drive(Drive::new(&slave.device, settings, Subscriber::default()))
+        Node::Drive(Drive::new(&slave.device, settings, Subscriber::new(!preset_blocks(slave).is_empty())))
     } else {
         Node::Encoder(Encoder::new(&slave.device, settings, Disc::new(&slave.device, &slave.options)))
     };

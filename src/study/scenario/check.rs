@@ -27,22 +27,19 @@ struct Facts<'a> {
 /// All rules in stages. A stage takes for granted that the stages before found nothing.
 const STAGES: &[&[Rule]] = &[
     &[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length],
-    &[isochronous_rate, bus_parameters, device_max_tsdr, own_t_sdr],
-    &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
+    &[isochronous_rate, device_rates, bus_parameters, device_max_tsdr, own_t_sdr],
+    &[t_dp_limits, min_interval, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
     &[encoder_parameters, resolution],
     &[t_i_grid, t_o_grid, t_i_minimum, t_o_minimum, t_o_maximum, window, delay, least_window],
     &[quantum],
     &[functions, code_sequence, units_per_rev, total_range, jitter_fits, cycles_fit],
-    &[publishers, subscribers, samples, link_counts, link_watchdog],
-    &[event_stations, event_instants, disturbance_stations],
+    &[publishers, subscribers, samples, link_counts, link_watchdog, set_prm_length],
+    &[event_stations, acyclic_devices, event_instants, disturbance_stations],
     &[start_up],
 ];
 
 /// Largest offset of a crystal. Model: twice what cheap ones have over temperature and age.
 const CRYSTAL_MAX_PPB: i64 = 200_000;
-/// Most links of a subscriber (VPC3+C manual).
-const LINKS_MAX: usize = 29;
-
 /// Checks `scenario` stage by stage until one complains.
 pub(super) fn check(scenario: &Scenario, reader: &mut Reader<'_>) -> Vec<super::error::Problem> {
     let facts = Facts { scenario, plan: Plan::of(scenario) };
@@ -150,6 +147,17 @@ fn isochronous_rate(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     }
 }
 
+fn device_rates(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let rate = facts.scenario.bus.params.rate;
+    for slave in facts.scenario.configured().filter(|slave| !slave.device.works_at(rate)) {
+        let all = BitRate::ALL.iter().filter(|&&rate| rate >= BitRate::M1_5 && slave.device.works_at(rate));
+        let fault = Fault::new(format!("slave {} does not work at {rate}", slave.address))
+            .rule(format!("bit rates of {} (its GSD file)", slave.device.name))
+            .help(all.map(|rate| format!("\"{rate}\"")).collect::<Vec<_>>().join(", "));
+        about(reader, "bus.rate", &[], fault);
+    }
+}
+
 fn bus_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let bus = &facts.scenario.bus;
     if let Err(broken) = bus.params.check(Bus::propagation(bus.cable_mm)) {
@@ -200,6 +208,19 @@ fn t_dp_limits(facts: &Facts<'_>, reader: &mut Reader<'_>) {
             let fault = Fault::new(format!("T_DP = {t_dp} is out of the range of {}", slave.device.name))
                 .rule(format!("T_DP is {min} to {max} (manual 3.3.2)"))
                 .help(format!("t_dp = \"{}\"", t_dp.clamp(min, max)));
+            about(reader, "master.t_dp", &[], fault);
+        }
+    }
+}
+
+fn min_interval(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let t_dp = facts.scenario.master.t_dp;
+    for slave in facts.scenario.configured() {
+        let min = slave.device.min_interval;
+        if t_dp < min {
+            let fault = Fault::new(format!("T_DP = {t_dp} polls slave {} too often", slave.address))
+                .rule(format!("{min} between two polls of {} (GSD: Min_Slave_Intervall)", slave.device.name))
+                .help(format!("t_dp = \"{}\"", min.ceil_to(slave.device.dp_grid())));
             about(reader, "master.t_dp", &[], fault);
         }
     }
@@ -594,10 +615,44 @@ fn samples(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 fn link_counts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
         let mut own = links(facts).filter(|(_, link)| link.subscriber == slave.address);
-        if let Some((path, _)) = own.nth(LINKS_MAX) {
-            let fault = Fault::new(format!("slave {} has more than {LINKS_MAX} links", slave.address))
-                .rule(format!("a subscriber has up to {LINKS_MAX} links (VPC3+C manual)"));
+        let max = usize::from(slave.device.max_links);
+        if let Some((path, _)) = own.nth(max) {
+            let source = if slave.user_prm.is_empty() { "VPC3+C manual" } else { "GSD: DXB_Max_Link_Count" };
+            let fault = Fault::new(format!("slave {} has more than {max} links", slave.address))
+                .rule(format!("a subscriber has up to {max} links ({source})"));
             about(reader, &format!("{path}.subscriber"), &[], fault);
+        }
+    }
+}
+
+/// Blocks and links fit into what the device takes.
+fn set_prm_length(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for slave in facts.scenario.configured() {
+        let octets = build::set_prm(facts.scenario, slave).len() - 7;
+        if octets > slave.device.max_prm.into() {
+            let fault = Fault::new(format!("slave {} would get {octets} octets of user parameters", slave.address))
+                .rule(format!(
+                    "{} takes {} octets (GSD: Max_User_Prm_Data_Len)",
+                    slave.device.name, slave.device.max_prm
+                ))
+                .help("a link takes 4 octets; is the GSD file right?");
+            about_slave(reader, slave, "device", fault);
+        }
+    }
+}
+
+/// Parameters are asked of devices that answer.
+fn acyclic_devices(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (i, event) in facts.scenario.events.iter().enumerate() {
+        if !matches!(event.action, Action::ReadParameter { .. } | Action::ChangeParameter { .. }) {
+            continue;
+        }
+        let mut slaves = event.slaves.iter().filter_map(|&address| configured(facts, address));
+        if let Some(slave) = slaves.find(|slave| !slave.device.acyclic && !slave.user_prm.is_empty()) {
+            let fault = Fault::new(format!("slave {} takes no acyclic requests", slave.address))
+                .rule(format!("{} has no C1_Read_Write_supp (its GSD file)", slave.device.name));
+            let path = format!("event.{}", i + 1);
+            about(reader, &format!("{path}.slave"), &[&format!("{path}.slaves")], fault);
         }
     }
 }
