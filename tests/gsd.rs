@@ -109,6 +109,9 @@ fn a_network_from_gsd_files_has_the_fingerprint_of_the_built_in_one() {
     }
 }
 
+/// Shipped scenarios that have their test here.
+pub(crate) const TESTS: &[(&str, fn())] = &[("gsd-device", gsd_device)];
+
 #[test]
 fn gsd_device() {
     let network = scenario("gsd-device", &[]);
@@ -251,6 +254,15 @@ fn the_rules_of_the_bus_take_the_files_numbers() {
         );
     }
     assert!(load(&text(), DEVICE, read).is_ok());
+}
+
+/// The configuration tool sets watchdog base, Publisher_Enable and its like; alarms are the file's.
+#[test]
+fn the_tool_has_the_last_word_on_dpv1_status() {
+    let gsd = with("0x00,0x00,0x08, \\", "0x27,0xFD,0xFF, \\");
+    let network = load(&gsd, DEVICE, "").unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(build::set_prm(&network, &network.slaves[0])[7..10], [0xC0, 0xFD, 0x1F]);
+    assert_eq!(Run::of(&network).phases_of(3).last().map(|phase| phase.0), Some(Phase::Operation));
 }
 
 /// A subscriber has user parameters of its own, which the model sends and does not read.
@@ -471,7 +483,7 @@ fn ask(octets: &[u8]) {
         Ok(gsd) => {
             let page = gsd.to_string();
             assert!(page.contains("can be simulated") || page.contains("cannot be simulated") || !page.is_empty());
-            let modules: Vec<_> = gsd.modules().map(str::to_owned).collect();
+            let modules: Vec<_> = gsd.modules().take(3).map(str::to_owned).collect();
             for module in modules.iter().map(|name| Some(name.as_str())).chain([None]) {
                 let (device, prm) = (gsd.device(module), gsd.user_prm(module));
                 if let (Ok(device), Ok(prm)) = (device, prm) {
@@ -483,6 +495,40 @@ fn ask(octets: &[u8]) {
         }
         Err(problem) => assert!(!problem.fault.message.is_empty() && !problem.to_string().is_empty()),
     }
+}
+
+/// Long files of one thing: read or refused, but in no time that grows with its square.
+#[test]
+fn long_files_take_no_longer_than_they_are() {
+    let many = |count: usize, of: &dyn Fn(usize) -> String| (0..count).map(of).collect::<String>();
+    let modules = |count| many(count, &|i| format!("Module = \"M{i}\" 0x10\n{i}\nEndModule\n"));
+    let files = [
+        many(60_000, &|i| format!("k{i} = 1\n")),
+        many(60_000, &|_| "Fail_Safe = 1\n".to_owned()),
+        many(60_000, &|_| "UnitDiagType = 1\n".to_owned()),
+        many(20_000, &|i| format!("UnitDiagType = {i}\nEndUnitDiagType\n")),
+        many(20_000, &|_| "Ext_User_Prm_Data_Ref(0) = 9\n".to_owned()),
+        format!(
+            "{}SlotDefinition\n{}EndSlotDefinition\n",
+            modules(3_000),
+            many(255, &|i| format!("Slot({i}) = \"s\" 1 0-65535\n"))
+        ),
+        modules(20_000),
+        format!("Vendor_Name = \"{}\"\n", "x\\\n".repeat(100_000)),
+        format!("Ext_User_Prm_Data_Const(0) = {}\n", "1,".repeat(200_000)),
+        "(".repeat(400_000),
+    ];
+    for file in files {
+        ask(format!("#Profibus_DP\n{file}").as_bytes());
+    }
+    let slots = |count| {
+        let slots = many(count, &|i| format!("Slot({i}) = \"s\" 1 0-65535\n"));
+        with("EndModule", &format!("EndModule\n{}SlotDefinition\n{slots}EndSlotDefinition\n", modules(3_000)))
+    };
+    let problem = Gsd::parse("test.gsd", slots(255).as_bytes()).expect_err("too many");
+    assert!(problem.fault.message.contains("too many slots for too many modules"));
+    let page = parse(&slots(2)).to_string();
+    assert!(page.contains("...\n") && page.contains("and 2941 more"), "{page}");
 }
 
 #[test]

@@ -64,9 +64,12 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
     builder.expect("a checked scenario fits into Set_Prm").octets().to_vec()
 }
 
-/// DPV1_Status as a GSD file presets it.
+/// DPV1_Status as a GSD file presets it, without what the configuration tool decides and what is reserved.
 fn preset_status(slave: &Slave) -> DpV1Status {
-    slave.user_prm.first_chunk().map_or(DpV1Status::default(), |&octets| DpV1Status::from_octets(octets))
+    let preset = slave.user_prm.first_chunk().map_or(DpV1Status::default(), |&octets| DpV1Status::from_octets(octets));
+    let [_, check_cfg_mode, _] = DpV1Status::CHECK_CFG_MODE.octets();
+    let [_, octet_9, _] = preset.octets();
+    DpV1Status::from_octets([0, preset.alarms() | octet_9 & check_cfg_mode, preset.alarm_mode()])
 }
 /// The blocks of a GSD file's user parameters.
 fn preset_blocks(slave: &Slave) -> &[u8] {

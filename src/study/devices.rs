@@ -33,6 +33,7 @@ pub fn list() -> String {
     lines.extend(aligned(&["name", "what it is"], &[0, 1], &PROFILES.iter().map(titles).collect::<Vec<_>>()));
     lines.push(String::new());
     lines.push("in, out: octets; rates in bit/s; everything about one device: isodp devices NAME".to_owned());
+    lines.push("others come from GSD files, device = { gsd = \"FILE\" }; what one says: isodp gsd FILE".to_owned());
     text(&lines)
 }
 

@@ -29,7 +29,7 @@ use crate::time::{Span, Tbit};
 use crate::wire::Address;
 pub use crate::wire::parameter::Format;
 use section::Reader;
-pub(super) use section::suggestion;
+pub(super) use section::{nearest, suggestion};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;

@@ -4,7 +4,7 @@ use super::file::{File, Value};
 use super::prm::UserPrm;
 use crate::device::drive::MAX_LINKS;
 use crate::device::profile::{DISC, FUNCTIONS_MIN, GAP_MIN, MAX_PRM, MIN_WINDOW, Profile};
-use crate::study::scenario::{Fault, suggestion};
+use crate::study::scenario::{Fault, nearest};
 use crate::time::{BitRate, Span, Tbit};
 use crate::wire::config::{self, TELEGRAM_81};
 use crate::wire::prm::IsoM;
@@ -115,7 +115,8 @@ pub(super) fn module(file: &File, name: Option<&str>) -> Result<usize, Fault> {
         let plain = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ").to_lowercase();
         return names().position(|known| plain(known) == plain(name)).ok_or_else(|| {
             let shown: String = name.chars().take(40).collect();
-            Fault::new(format!("the GSD file has no module \"{shown}\"")).help(suggestion(name, names()))
+            let help = nearest(name, names()).unwrap_or_else(|| some(names()));
+            Fault::new(format!("the GSD file has no module \"{shown}\"")).help(help)
         });
     }
     let mut telegram_81 = (0..modules.len()).filter(|&i| modules[i].config == TELEGRAM_81);

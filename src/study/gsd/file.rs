@@ -10,6 +10,7 @@ use super::lex::{At, Kind, Line, Token};
 use crate::device::profile::MAX_PRM;
 use gsd_parser::GenericStationDescription;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::path::Path;
 
 /// The value of a keyword.
@@ -49,6 +50,9 @@ const SKIPPED: &[(&str, &str)] = &[
 /// Data types of user parameters besides Bit and BitArea.
 const DATA_TYPES: [&str; 6] = ["Unsigned8", "Unsigned16", "Unsigned32", "Signed8", "Signed16", "Signed32"];
 
+/// Most comparisons that the crate may need to find the modules of slots.
+const MOST_SEARCHES: usize = 400_000_000;
+
 /// What must come before what in the text for the crate.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Part {
@@ -84,7 +88,7 @@ struct Reader<'a> {
     data: BTreeSet<u32>,
     data_refs: Vec<(u32, At)>,
     references: BTreeSet<u32>,
-    slot_defaults: Vec<(u32, At)>,
+    slots: Vec<Slot>,
 }
 
 impl<'a> Reader<'a> {
@@ -297,9 +301,7 @@ impl<'a> Reader<'a> {
 
     /// Lines `Slot(1) = "name" 1 1-3` or `... 1 1,2,3` up to `EndSlotDefinition`.
     fn slot_definition(&mut self, first: &Token) -> Result<(), Wrong> {
-        let rows = self.block(first, "EndSlotDefinition")?;
-        let mut slots = Vec::new();
-        for row in rows {
+        for row in self.block(first, "EndSlotDefinition")? {
             let setting = Setting::of(row)?;
             let wrong = || Wrong::at(row[0].at, "no slot").help("such as Slot(1) = \"name\" 1 1-3");
             let number = unsigned(setting.index, setting.key, 0xFF)?;
@@ -308,28 +310,51 @@ impl<'a> Reader<'a> {
                 return Err(wrong());
             }
             let preset = unsigned(std::slice::from_ref(default), default, 0xFFFF)?;
-            let allowed = choice(allowed, default, 0..=0xFFFF)?;
-            self.slot_defaults.push((preset, default.at));
-            slots.push(format!("Slot({number})=\"{}\" {preset} {allowed}", name.text));
+            let allowed = Choice::of(allowed, default, 0..=0xFFFF)?;
+            self.slots.push(Slot { number, name: name.text.clone(), preset, at: default.at, allowed });
         }
-        if !slots.is_empty() {
-            self.write(Part::Slots, format!("SlotDefinition\n{}\nEndSlotDefinition", slots.join("\n")));
+        Ok(())
+    }
+    /// The slots for the crate, with the modules that are there instead of ranges.
+    fn write_slots(&mut self) -> Result<(), Wrong> {
+        let mut lines = Vec::new();
+        let mut entries = 0;
+        for slot in std::mem::take(&mut self.slots) {
+            if !self.references.contains(&slot.preset) {
+                return Err(missing("module", slot.preset, slot.at));
+            }
+            let mut allowed: Vec<u32> = match slot.allowed {
+                Choice::Range(low, high) => {
+                    let there = |number: &i64| *number >= low && *number <= high;
+                    self.references.iter().copied().filter(|&number| there(&number.into())).collect()
+                }
+                Choice::Set(numbers) => numbers.iter().map(|&number| number as u32).collect(),
+            };
+            if allowed.is_empty() {
+                allowed.push(slot.preset);
+            }
+            entries += allowed.len();
+            if entries * self.references.len() > MOST_SEARCHES {
+                return Err(Wrong::at(slot.at, "too many slots for too many modules"));
+            }
+            let allowed = allowed.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
+            lines.push(format!("Slot({})=\"{}\" {} {allowed}", slot.number, slot.name, slot.preset));
+        }
+        if !lines.is_empty() {
+            self.write(Part::Slots, format!("SlotDefinition\n{}\nEndSlotDefinition", lines.join("\n")));
         }
         Ok(())
     }
 
     /// Compares what is asked for with what is there, and lets the crate read.
     fn finish(mut self) -> Result<File, Wrong> {
-        let asked = [
-            ("PrmText", &self.texts, &self.text_refs),
-            ("ExtUserPrmData", &self.data, &self.data_refs),
-            ("module", &self.references, &self.slot_defaults),
-        ];
+        let asked = [("PrmText", &self.texts, &self.text_refs), ("ExtUserPrmData", &self.data, &self.data_refs)];
         for (what, there, refs) in asked {
             if let Some((id, at)) = refs.iter().find(|(id, _)| !there.contains(id)) {
-                return Err(Wrong::at(*at, format!("there is no {what} {id}")).help("is the file complete?"));
+                return Err(missing(what, *id, *at));
             }
         }
+        self.write_slots()?;
         self.clean.sort_by_key(|&(part, _)| part);
         let lines: Vec<_> = self.clean.into_iter().map(|(_, text)| text).collect();
         if lines.is_empty() {
@@ -349,6 +374,20 @@ impl<'a> Reader<'a> {
             description,
         })
     }
+}
+
+/// A slot and the modules that may be in it.
+struct Slot {
+    number: u32,
+    name: String,
+    preset: u32,
+    /// Where the file says the preset.
+    at: At,
+    allowed: Choice,
+}
+
+fn missing(what: &str, id: u32, at: At) -> Wrong {
+    Wrong::at(at, format!("there is no {what} {id}")).help("is the file complete?")
 }
 
 /// `Key = values` or `Key(index) = values`.
@@ -461,21 +500,34 @@ fn list(octets: &[u8]) -> String {
     octets.iter().map(u8::to_string).collect::<Vec<_>>().join(",")
 }
 
-/// `0-255` or `0,1,5`, written for the crate.
-fn choice(tokens: &[Token], key: &Token, range: std::ops::RangeInclusive<i64>) -> Result<String, Wrong> {
-    let within = |part: &[Token]| {
-        let number = signed(part, key)?;
-        let at = part.first().map_or(key.at, |token| token.at);
-        if range.contains(&number) { Ok(number) } else { Err(Wrong::at(at, format!("{number} is out of range"))) }
-    };
-    // The sign in the middle is the one after a number.
-    let middle = (1..tokens.len()).find(|&at| tokens[at].is("-") && tokens[at - 1].kind == Kind::Word);
-    if let Some(at) = middle {
-        return Ok(format!("{}-{}", within(&tokens[..at])?, within(&tokens[at + 1..])?));
+/// Values to choose from: `0-255` or `0,1,5`.
+enum Choice {
+    Range(i64, i64),
+    Set(Vec<i64>),
+}
+
+impl Choice {
+    fn of(tokens: &[Token], key: &Token, range: std::ops::RangeInclusive<i64>) -> Result<Self, Wrong> {
+        let within = |part: &[Token]| {
+            let number = signed(part, key)?;
+            let at = part.first().map_or(key.at, |token| token.at);
+            if range.contains(&number) { Ok(number) } else { Err(Wrong::at(at, format!("{number} is out of range"))) }
+        };
+        // The sign in the middle is the one after a number.
+        let middle = (1..tokens.len()).find(|&at| tokens[at].is("-") && tokens[at - 1].kind == Kind::Word);
+        match middle {
+            Some(at) => Ok(Self::Range(within(&tokens[..at])?, within(&tokens[at + 1..])?)),
+            None => tokens.split(|token| token.is(",")).map(within).collect::<Result<_, _>>().map(Self::Set),
+        }
     }
-    let numbers: Result<Vec<_>, _> =
-        tokens.split(|token| token.is(",")).map(|part| within(part).map(|n| n.to_string())).collect();
-    Ok(numbers?.join(","))
+}
+impl fmt::Display for Choice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Range(low, high) => write!(f, "{low}-{high}"),
+            Self::Set(values) => f.write_str(&values.iter().map(i64::to_string).collect::<Vec<_>>().join(",")),
+        }
+    }
 }
 
 /// The line of a parameter's type, `Unsigned8 0 0-255`, `Bit(1) 0 0-1` or `BitArea(2-3) 0 0,1,2`, for the crate.
@@ -513,7 +565,7 @@ fn data_type(row: &Line) -> Result<String, Wrong> {
     let (default, allowed) = rest.split_at(length.min(rest.len()));
     let default = signed(default, first)?;
     let limits = -i64::from(u32::MAX)..=u32::MAX.into();
-    let allowed = if allowed.is_empty() { String::new() } else { choice(allowed, first, limits)? };
+    let allowed = if allowed.is_empty() { String::new() } else { Choice::of(allowed, first, limits)?.to_string() };
     Ok(format!("{name} {default} {allowed}"))
 }
 

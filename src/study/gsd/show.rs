@@ -8,14 +8,15 @@ use super::{Gsd, device};
 use crate::study::report::aligned;
 use crate::time::Span;
 use crate::wire::config;
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// Longest text that is shown as a value (characters).
 const TEXT: usize = 40;
-/// Modules that are shown.
-const MODULES: usize = 40;
-/// Ignored keywords that are shown.
-const IGNORED: usize = 60;
+/// Rows of a table that are shown.
+const ROWS: usize = 60;
+/// Modules of a slot that are shown.
+const ALLOWED: usize = 12;
 
 impl fmt::Display for Gsd {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -44,8 +45,11 @@ impl Gsd {
         }
         lines.extend([String::new(), "does not fit".to_owned()]);
         let line = |line: Option<usize>| line.map_or_else(|| "-".to_owned(), |line| line.to_string());
-        let rows: Vec<_> = found.into_iter().map(|finding| vec![line(finding.line), finding.message]).collect();
+        let count = found.len();
+        let shown = found.into_iter().take(ROWS);
+        let rows: Vec<_> = shown.map(|finding| vec![line(finding.line), finding.message]).collect();
         lines.extend(aligned(&["line", "what"], &[1], &rows));
+        more(count, lines);
     }
     fn verdict(&self, lines: &mut Vec<String>) {
         lines.push(String::new());
@@ -62,6 +66,13 @@ impl Gsd {
                 lines.extend([fault.message, fault.rule, fault.help].into_iter().filter(|text| !text.is_empty()));
             }
         }
+    }
+}
+
+/// Says how many of `count` rows were left out.
+fn more(count: usize, lines: &mut Vec<String>) {
+    if count > ROWS {
+        lines.push(format!("and {} more", count - ROWS));
     }
 }
 
@@ -112,19 +123,21 @@ fn modules(file: &File, lines: &mut Vec<String>) {
             .map_or(("-".to_owned(), "-".to_owned()), |(inputs, outputs)| (inputs.to_string(), outputs.to_string()));
         vec![module.name.trim().to_owned(), hex(&module.config), inputs, outputs, at.line.to_string()]
     };
-    let rows: Vec<_> = all.iter().zip(&file.modules).take(MODULES).map(row).collect();
+    let rows: Vec<_> = all.iter().zip(&file.modules).take(ROWS).map(row).collect();
     if !rows.is_empty() {
         lines.push(String::new());
         lines.extend(aligned(&["module", "Chk_Cfg", "in", "out", "line"], &[0, 1], &rows));
     }
-    if all.len() > MODULES {
-        lines.push(format!("and {} more", all.len() - MODULES));
-    }
-    for slot in &file.description.slots {
-        let allowed: Vec<_> = slot.allowed_modules.iter().map(|module| module.name.trim()).collect();
+    more(all.len(), lines);
+    for slot in file.description.slots.iter().take(ROWS) {
+        let mut allowed: Vec<_> = slot.allowed_modules.iter().take(ALLOWED).map(|module| module.name.trim()).collect();
+        if slot.allowed_modules.len() > ALLOWED {
+            allowed.push("...");
+        }
         let usual = slot.default.name.trim();
         lines.push(format!("slot {} {}: {usual}; allowed: {}", slot.number, slot.name.trim(), allowed.join(", ")));
     }
+    more(file.description.slots.len(), lines);
 }
 
 fn user_parameters(file: &File, lines: &mut Vec<String>) {
@@ -146,17 +159,20 @@ fn user_parameters(file: &File, lines: &mut Vec<String>) {
             text.unwrap_or_else(|| allowed(definition)),
         ]
     };
-    let rows: Vec<_> = prm.named().map(row).collect();
+    let rows: Vec<_> = prm.named().take(ROWS).map(row).collect();
     if !rows.is_empty() {
         lines.extend(aligned(&["user parameter", "octet", "type", "preset", "can be"], &[0, 2, 4], &rows));
     }
+    more(prm.named().count(), lines);
 }
 
 fn ignored(file: &File, lines: &mut Vec<String>) {
     // Keywords that are there again and again are one line.
+    let mut known = BTreeMap::new();
     let mut rows: Vec<(&str, Vec<usize>)> = Vec::new();
     for (keyword, line) in &file.ignored {
-        match rows.iter_mut().find(|(known, _)| known.eq_ignore_ascii_case(keyword)) {
+        let row = *known.entry(keyword.to_lowercase()).or_insert(rows.len());
+        match rows.get_mut(row) {
             Some((_, places)) => places.push(*line),
             None => rows.push((keyword, vec![*line])),
         }
@@ -170,9 +186,7 @@ fn ignored(file: &File, lines: &mut Vec<String>) {
         let all = if places.len() == 1 { first } else { format!("{first} and {} more", places.len() - 1) };
         vec![(*keyword).to_owned(), all]
     };
-    let shown: Vec<_> = rows.iter().take(IGNORED).map(row).collect();
+    let shown: Vec<_> = rows.iter().take(ROWS).map(row).collect();
     lines.extend(aligned(&["ignored, without an effect here", "line"], &[0, 1], &shown));
-    if rows.len() > IGNORED {
-        lines.push(format!("and {} more", rows.len() - IGNORED));
-    }
+    more(rows.len(), lines);
 }

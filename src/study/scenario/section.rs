@@ -157,7 +157,7 @@ impl<'t> Section<'t> {
 }
 
 /// "did you mean ..." if one of `known` is near `word`.
-fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<String> {
+pub(in crate::study) fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<String> {
     // Nothing long is near, and the distance of long words takes long.
     let word: String = word.chars().take(60).collect::<String>().to_lowercase().replace('_', "-");
     let distance = |name: &str| strsim::damerau_levenshtein(&word, &name.replace('_', "-"));
