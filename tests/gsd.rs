@@ -48,7 +48,6 @@ fn assert_same(read: &Profile, known: &Profile) {
         outputs,
         max_tsdr,
         rates,
-        min_interval,
         t_dp_min,
         t_dp_max,
         t_base_dp,
@@ -63,20 +62,25 @@ fn assert_same(read: &Profile, known: &Profile) {
         revolutions,
         publisher,
         subscriber,
-        max_links,
+        dxb,
         max_prm,
         fail_safe,
+        sync,
+        freeze,
+        max_diag,
+        min_slave_interval,
         acyclic,
         source,
     } = read;
     assert_eq!((name, title, ident, config), (&known.name, &known.title, &known.ident, &known.config));
     assert_eq!((inputs, outputs, max_tsdr, rates), (&known.inputs, &known.outputs, &known.max_tsdr, &known.rates));
-    assert_eq!((min_interval, t_dp_min, t_dp_max), (&known.min_interval, &known.t_dp_min, &known.t_dp_max));
+    assert_eq!((min_slave_interval, t_dp_min, t_dp_max), (&known.min_slave_interval, &known.t_dp_min, &known.t_dp_max));
+    assert_eq!((sync, freeze, max_diag), (&known.sync, &known.freeze, &known.max_diag));
     assert_eq!((t_base_dp, t_base_io, t_i_min), (&known.t_base_dp, &known.t_base_io, &known.t_i_min));
     assert_eq!((t_o_min, gap_min, functions_min), (&known.t_o_min, &known.gap_min, &known.functions_min));
     assert_eq!((t_pll_w_max, min_window), (&known.t_pll_w_max, &known.min_window));
     assert_eq!((steps_per_rev, revolutions), (&known.steps_per_rev, &known.revolutions));
-    assert_eq!((publisher, subscriber, max_links), (&known.publisher, &known.subscriber, &known.max_links));
+    assert_eq!((publisher, subscriber, dxb), (&known.publisher, &known.subscriber, &known.dxb));
     assert_eq!((max_prm, fail_safe, acyclic), (&known.max_prm, &known.fail_safe, &known.acyclic));
     assert!(source.contains("test.gsd"), "where it comes from is its own: {source}");
 }
@@ -232,7 +236,7 @@ fn the_rules_of_the_bus_take_the_files_numbers() {
     let table = [
         ("12M_supp                 = 1", "12M_supp = 0", "", "slave 3 does not work at 12 Mbit/s"),
         ("MaxTsdr_12M              = 800", "MaxTsdr_12M = 900", "", "slave 3 may take MaxTsdr = 900"),
-        ("Min_Slave_Intervall      = 1 ", "Min_Slave_Intervall = 25 ", "", "2.5 ms between two polls"),
+        ("Min_Slave_Intervall      = 1 ", "Min_Slave_Intervall = 25 ", "", "Min_Slave_Interval = 2.5 ms"),
         ("TDP_MIN                  = 4", "TDP_MIN = 20", "", "T_DP is 2.5 ms to 32 ms"),
         ("TBASE_DP                 = 1500", "TBASE_DP = 12000", "", "4 ms to 32 ms"),
         ("TI_MIN                   = 1", "TI_MIN = 4", "", "T_I >= 500 us"),
@@ -283,7 +287,7 @@ fn a_subscriber_from_a_gsd_file_follows_a_publisher() {
 
     let second = format!("{more}[[link]]\npublisher = 5\nsubscriber = 3\n");
     let error = load(&gsd, DEVICE, &second).expect_err("one link at most");
-    assert!(error.contains("up to 1 links (GSD: DXB_Max_Link_Count)"), "{error}");
+    assert!(error.contains("up to 1 links, each sample is one (DXB_Max_Link_Count)"), "{error}");
 }
 
 #[test]

@@ -5,7 +5,6 @@ use alloc::sync::Arc;
 use core::fmt;
 use core::ops::Deref;
 
-use crate::device::drive::MAX_LINKS;
 use crate::device::options::Resolution;
 use crate::fdl::params::BusParams;
 use crate::time::{BitRate, Span, Tbit};
@@ -16,8 +15,8 @@ use crate::wire::prm;
 const TELEGRAM_81: &[u8] = &config::TELEGRAM_81;
 
 /// A kind of slave that a scenario can name.
-#[expect(clippy::struct_excessive_bools, reason = "a GSD file's flags")]
 #[derive(Clone, PartialEq, Eq, Debug)]
+#[allow(clippy::struct_excessive_bools)] // What a GSD file says with a key each.
 pub struct Profile {
     /// The name in scenario files and tables.
     pub name: Cow<'static, str>,
@@ -35,8 +34,6 @@ pub struct Profile {
     pub max_tsdr: [Tbit; BitRate::ALL.len()],
     /// Whether it works at each bit rate, in the same order.
     pub rates: [bool; BitRate::ALL.len()],
-    /// Min_Slave_Intervall, the shortest time between two polls.
-    pub min_interval: Span,
     /// TDP_MIN, the shortest T_DP (manual 3.3.2).
     pub t_dp_min: Span,
     /// TDP_MAX, the longest T_DP (manual 3.3.2).
@@ -65,16 +62,46 @@ pub struct Profile {
     pub publisher: bool,
     /// Whether it can receive other slaves' inputs.
     pub subscriber: bool,
-    /// Most links that its subscriber function has (DXB_Max_Link_Count).
-    pub max_links: u8,
+    /// What it takes as a subscriber.
+    pub dxb: DxbLimits,
     /// Octets of Set_Prm from octet 8 on that it takes at most (Max_User_Prm_Data_Len).
     pub max_prm: u8,
     /// Whether an empty Data_Exchange means Clear to it.
     pub fail_safe: bool,
+    /// Whether it takes Sync_Req in Set_Prm: outputs that wait for Sync.
+    pub sync: bool,
+    /// Whether it takes Freeze_Req in Set_Prm: inputs that are held.
+    pub freeze: bool,
+    /// Max_Diag_Data_Len (octets), 6..=244 (manual 5.1).
+    pub max_diag: u8,
+    /// Min_Slave_Intervall, the shortest time between two Data_Exchange with it; GSD files have it in 100 us.
+    pub min_slave_interval: Span,
     /// Whether it takes acyclic requests of its master (C1_Read_Write_supp).
     pub acyclic: bool,
     /// Where all this comes from.
     pub source: Cow<'static, str>,
+}
+
+/// What a subscriber takes (GSD keywords DXB_Max_Link_Count, DXB_Max_Data_Length).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct DxbLimits {
+    /// Entries of both tables together, at most [`DxbLimits::MOST_LINKS`].
+    pub links: u8,
+    /// Longest sample, and the data area of each slot (octets).
+    pub data: u8,
+    /// Slots with a data area for the subscriber table, numbered from 1.
+    pub slots: u8,
+    /// Whether it takes blocks of user parameters besides. Model: what they do is the manufacturer's, and nothing here.
+    pub user_blocks: bool,
+}
+
+impl DxbLimits {
+    /// Most links of a subscriber (VPC3+C manual).
+    pub const MOST_LINKS: u8 = 29;
+    /// No subscriber.
+    pub const NONE: Self = Self { links: 0, data: 0, slots: 0, user_blocks: false };
+    /// All that the ASIC allows. Model: two slots, so that samples can go to one or the other.
+    pub const FULL: Self = Self { links: Self::MOST_LINKS, data: 244, slots: 2, user_blocks: false };
 }
 
 impl Profile {
@@ -116,7 +143,10 @@ struct Row {
     ident: u16,
     config: &'static [u8],
     max_tsdr: [Tbit; BitRate::ALL.len()],
-    subscriber: bool,
+    publisher: bool,
+    dxb: DxbLimits,
+    sync_freeze: bool,
+    max_diag: u8,
     source: &'static str,
 }
 
@@ -132,7 +162,6 @@ const fn profile(row: Row) -> Profile {
         outputs: 4,
         max_tsdr: row.max_tsdr,
         rates: wired_rates(),
-        min_interval: Span::from_us(100),
         t_dp_min: Span::from_us(500),
         t_dp_max: Span::from_ms(32),
         t_base_dp: 1_500,
@@ -145,12 +174,16 @@ const fn profile(row: Row) -> Profile {
         min_window: MIN_WINDOW,
         steps_per_rev: DISC.steps_per_rev,
         revolutions: DISC.revolutions,
-        publisher: !row.subscriber,
-        subscriber: row.subscriber,
-        max_links: if row.subscriber { MAX_LINKS as u8 } else { 0 },
-        max_prm: if row.subscriber { MAX_PRM } else { 52 },
+        publisher: row.publisher,
+        subscriber: row.dxb.links > 0,
+        dxb: row.dxb,
+        max_prm: if row.dxb.links > 0 { MAX_PRM } else { 52 },
         fail_safe: true,
-        acyclic: !row.subscriber,
+        sync: row.sync_freeze,
+        freeze: row.sync_freeze,
+        max_diag: row.max_diag,
+        min_slave_interval: Span::from_us(100),
+        acyclic: row.dxb.links == 0,
         source: Cow::Borrowed(row.source),
     }
 }
@@ -166,6 +199,9 @@ pub const DISC: Resolution = Resolution { steps_per_rev: 8_192, revolutions: 4_0
 /// Octets of Set_Prm behind octet 7 that fit into a telegram.
 pub const MAX_PRM: u8 = prm::MAX_PRM as u8 - 7;
 
+/// Max_Diag_Data_Len of a subscriber (octets): the standard part and the status of 29 links. Model: D24, VPC3+C.
+const SUBSCRIBER_MAX_DIAG: u8 = 6 + 4 + 2 * DxbLimits::MOST_LINKS;
+
 /// Every device, in the order in which lists show them.
 pub const PROFILES: &[Profile] = &[
     profile(Row {
@@ -174,7 +210,11 @@ pub const PROFILES: &[Profile] = &[
         ident: 0x06DF,
         config: TELEGRAM_81,
         max_tsdr: profile_max_tsdr(),
-        subscriber: false,
+        publisher: true,
+        dxb: DxbLimits::NONE,
+        // The encoder manuals say nothing of Sync and Freeze.
+        sync_freeze: false,
+        max_diag: 6,
         source: "manual 2.1.1, 3.2, 3.3; MaxTsdr Model: D2, Ident Model: D24, T_PLL_W_MAX and Fail_Safe as SIEM80F9.GSE",
     }),
     profile(Row {
@@ -183,7 +223,11 @@ pub const PROFILES: &[Profile] = &[
         ident: 0x06DF,
         config: TELEGRAM_81,
         max_tsdr: profile_max_tsdr(),
-        subscriber: false,
+        publisher: true,
+        dxb: DxbLimits::NONE,
+        // The encoder manuals say nothing of Sync and Freeze.
+        sync_freeze: false,
+        max_diag: 6,
         source: "manual 2.1.1, 3.2, 3.3; MaxTsdr Model: D2, Ident Model: D24, T_PLL_W_MAX and Fail_Safe as SIEM80F9.GSE",
     }),
     profile(Row {
@@ -192,7 +236,10 @@ pub const PROFILES: &[Profile] = &[
         ident: 0x80F9,
         config: TELEGRAM_81,
         max_tsdr: fast_max_tsdr(),
-        subscriber: false,
+        publisher: true,
+        dxb: DxbLimits::NONE,
+        sync_freeze: true,
+        max_diag: 6,
         source: "SIEM80F9.GSE; times with octet 15 bit 1 and the narrowest window as the encoder manual, 3.2.2, 3.3.8",
     }),
     profile(Row {
@@ -202,8 +249,23 @@ pub const PROFILES: &[Profile] = &[
         ident: 0xF0D0,
         config: &[0xC3, 0xC1, 0xC5, 0xFD, 0x00, 0x00],
         max_tsdr: profile_max_tsdr(),
-        subscriber: true,
-        source: "Model: D24",
+        publisher: false,
+        dxb: DxbLimits::FULL,
+        sync_freeze: false,
+        max_diag: SUBSCRIBER_MAX_DIAG,
+        source: "Model: D24; links as VPC3+C",
+    }),
+    profile(Row {
+        name: "coupled-drive",
+        title: "generic DP-V2 slave that follows a publisher and publishes what it follows",
+        ident: 0xF0D1,
+        config: &[0xC3, 0xC1, 0xC5, 0xFD, 0x00, 0x00],
+        max_tsdr: profile_max_tsdr(),
+        publisher: true,
+        dxb: DxbLimits::FULL,
+        sync_freeze: false,
+        max_diag: SUBSCRIBER_MAX_DIAG,
+        source: "Model: subscriber-drive (D24) with the publisher function, for chains of slaves",
     }),
 ];
 
@@ -282,7 +344,9 @@ mod tests {
             assert_eq!(find(&profile.name), Some(profile));
             assert!(!profile.title.is_empty() && !profile.source.is_empty() && profile.ident != 0, "{}", profile.name);
             assert!(profile.t_dp_min.is_multiple_of(profile.dp_grid()), "{}", profile.name);
-            assert!(profile.publisher != profile.subscriber, "{}", profile.name);
+            assert!(profile.publisher || profile.subscriber, "{}", profile.name);
+            assert_eq!(profile.subscriber, profile.dxb != DxbLimits::NONE, "{}", profile.name);
+            assert!(profile.dxb.links <= DxbLimits::MOST_LINKS, "{}", profile.name);
         }
         assert_eq!(find("posital"), None);
     }

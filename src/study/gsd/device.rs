@@ -2,8 +2,7 @@
 
 use super::file::{File, Value};
 use super::prm::UserPrm;
-use crate::device::drive::MAX_LINKS;
-use crate::device::profile::{DISC, FUNCTIONS_MIN, GAP_MIN, MAX_PRM, MIN_WINDOW, Profile};
+use crate::device::profile::{DISC, DxbLimits, FUNCTIONS_MIN, GAP_MIN, MAX_PRM, MIN_WINDOW, Profile};
 use crate::study::scenario::{Fault, nearest};
 use crate::time::{BitRate, Span, Tbit};
 use crate::wire::config::{self, TELEGRAM_81};
@@ -177,7 +176,13 @@ fn of_module(file: &File, config: &[u8], subscriber: bool) -> Profile {
         max_tsdr[rate as usize] = file.max_tsdr(rate);
         rates[rate as usize] = file.works_at(rate);
     }
-    let links = iso_units("DXB_Max_Link_Count", MAX_LINKS as u32).min(MAX_LINKS as u32) as u8;
+    let octet = |keyword, full: u8| iso_units(keyword, full.into()).clamp(1, full.into()) as u8;
+    let dxb = DxbLimits {
+        links: octet("DXB_Max_Link_Count", DxbLimits::FULL.links),
+        data: octet("DXB_Max_Data_Length", DxbLimits::FULL.data),
+        user_blocks: true,
+        ..DxbLimits::FULL
+    };
     Profile {
         name: Cow::Owned(name(file)),
         title: Cow::Owned(title(file)),
@@ -187,7 +192,6 @@ fn of_module(file: &File, config: &[u8], subscriber: bool) -> Profile {
         outputs: OUTPUTS,
         max_tsdr,
         rates,
-        min_interval: Span::from_us(100) * i64::from(iso_units("Min_Slave_Intervall", 1)),
         t_dp_min: t_dp(t_dp_min),
         t_dp_max: t_dp(t_dp_max),
         t_base_dp: file.t_base_dp(),
@@ -202,9 +206,13 @@ fn of_module(file: &File, config: &[u8], subscriber: bool) -> Profile {
         revolutions: DISC.revolutions,
         publisher: file.flag("Publisher_supp"),
         subscriber,
-        max_links: if subscriber { links } else { 0 },
+        dxb: if subscriber { dxb } else { DxbLimits::NONE },
         max_prm: iso_units("Max_User_Prm_Data_Len", MAX_PRM.into()).min(MAX_PRM.into()) as u8,
         fail_safe: file.flag("Fail_Safe"),
+        sync: file.flag("Sync_Mode_supp"),
+        freeze: file.flag("Freeze_Mode_supp"),
+        max_diag: iso_units("Max_Diag_Data_Len", 6).clamp(6, 244) as u8,
+        min_slave_interval: Span::from_us(100) * i64::from(iso_units("Min_Slave_Intervall", 1)),
         acyclic: file.flag("C1_Read_Write_supp") && !subscriber,
         source: Cow::Borrowed(""),
     }
@@ -401,7 +409,7 @@ impl Findings<'_> {
             self.note("Max_User_Prm_Data_Len", message);
         }
         if file.flag("Subscriber_supp") && file.number("DXB_Max_Link_Count").is_none() {
-            let message = format!("a subscriber without DXB_Max_Link_Count; it is taken as {MAX_LINKS}");
+            let message = format!("a subscriber without DXB_Max_Link_Count; it is taken as {}", DxbLimits::MOST_LINKS);
             self.note("Subscriber_supp", message);
         }
     }

@@ -147,8 +147,8 @@ pub(super) const KEYWORDS: &[Keyword] = &[
     keyword("Max_User_Prm_Data_Len", Lengths, (U8, Octets), true, "of Set_Prm from octet 8 on"),
     keyword("User_Prm_Data_Len", Lengths, (U8, Octets), true, "of User_Prm_Data"),
     keyword("Fail_Safe", Services, (Flag, Plain), true, "an empty Data_Exchange means Clear"),
-    keyword("Sync_Mode_supp", Services, (Flag, Plain), true, "Sync; no master here uses it"),
-    keyword("Freeze_Mode_supp", Services, (Flag, Plain), true, "Freeze; no master here uses it"),
+    keyword("Sync_Mode_supp", Services, (Flag, Plain), true, "takes Sync"),
+    keyword("Freeze_Mode_supp", Services, (Flag, Plain), true, "takes Freeze"),
     keyword("Set_Slave_Add_supp", Services, (Flag, Plain), true, "takes its address over the bus"),
     keyword("DPV1_Slave", Services, (Flag, Plain), false, "octets 8 to 10 of Set_Prm are DPV1_Status"),
     keyword("C1_Read_Write_supp", Services, (Flag, Plain), false, "acyclic requests of its master"),
@@ -175,7 +175,7 @@ pub(super) const KEYWORDS: &[Keyword] = &[
     keyword("Publisher_supp", Dxb, (Flag, Plain), false, "other slaves can have its inputs"),
     keyword("Subscriber_supp", Dxb, (Flag, Plain), false, "takes other slaves' inputs"),
     keyword("DXB_Max_Link_Count", Dxb, (U8, Plain), false, "links at most"),
-    keyword("DXB_Max_Data_Length", Dxb, (U8, Octets), false, "of one publisher's data at most"),
+    keyword("DXB_Max_Data_Length", Dxb, (U8, Octets), false, "of one sample at most"),
     keyword("DXB_Subscribertable_Block_Location", Dxb, (U8, Plain), false, "where its table goes"),
 ];
 

@@ -1,11 +1,14 @@
 //! The rules between the keys of a scenario: one function per rule, each of which names the rule with its source, the
 //! numbers, and the nearest right value.
 
+use super::class2;
 use super::error::Fault;
+use super::gsd;
 use super::kinds::jitter_bound;
 use super::section::Reader;
+use super::services;
 use super::tree::Place;
-use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Scenario, Slave, When};
+use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Sample, Scenario, Slave, When};
 use crate::device::options::Resolution;
 use crate::sim::motion;
 use crate::sim::noise::GcJitter;
@@ -19,27 +22,32 @@ use crate::wire::Address;
 type Rule = fn(&Facts<'_>, &mut Reader<'_>);
 
 /// What the rules look at.
-struct Facts<'a> {
-    scenario: &'a Scenario,
+pub(super) struct Facts<'a> {
+    pub(super) scenario: &'a Scenario,
     plan: Plan,
 }
 
 /// All rules in stages. A stage takes for granted that the stages before found nothing.
 const STAGES: &[&[Rule]] = &[
     &[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length],
-    &[isochronous_rate, device_rates, bus_parameters, device_max_tsdr, own_t_sdr],
-    &[t_dp_limits, min_interval, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
+    &[class2::own_addresses, class2::positions, class2::slaves],
+    &[isochronous_rate, gsd::device_rates, bus_parameters, device_max_tsdr, own_t_sdr],
+    &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
+    &[services::slave_interval, services::data_control_time, services::sync_and_freeze],
     &[encoder_parameters, resolution],
     &[t_i_grid, t_o_grid, t_i_minimum, t_o_minimum, t_o_maximum, window, delay, least_window],
     &[quantum],
     &[functions, code_sequence, units_per_rev, total_range, jitter_fits, cycles_fit],
-    &[publishers, subscribers, samples, link_counts, link_watchdog, set_prm_length],
-    &[event_stations, acyclic_devices, event_instants, disturbance_stations],
+    &[publishers, subscribers, samples, link_counts, link_watchdog],
+    &[sample_lengths, destinations, told_lengths],
+    &[gsd::set_prm_length],
+    &[event_stations, gsd::acyclic_devices, event_instants, disturbance_stations, services::commands],
     &[start_up],
 ];
 
 /// Largest offset of a crystal. Model: twice what cheap ones have over temperature and age.
 const CRYSTAL_MAX_PPB: i64 = 200_000;
+
 /// Checks `scenario` stage by stage until one complains.
 pub(super) fn check(scenario: &Scenario, reader: &mut Reader<'_>) -> Vec<super::error::Problem> {
     let facts = Facts { scenario, plan: Plan::of(scenario) };
@@ -56,7 +64,7 @@ pub(super) fn check(scenario: &Scenario, reader: &mut Reader<'_>) -> Vec<super::
 }
 
 /// Complains about `key`, which stands at its own path or at one of `others`.
-fn about(reader: &mut Reader<'_>, key: &str, others: &[&str], fault: Fault) {
+pub(super) fn about(reader: &mut Reader<'_>, key: &str, others: &[&str], fault: Fault) {
     let place = match reader.place(&[key]) {
         Place::Missing => reader.place(others),
         place => place,
@@ -65,7 +73,7 @@ fn about(reader: &mut Reader<'_>, key: &str, others: &[&str], fault: Fault) {
 }
 
 /// Complains about `key` of `slave`, which may have inherited it from `[master]`.
-fn about_slave(reader: &mut Reader<'_>, slave: &Slave, key: &str, fault: Fault) {
+pub(super) fn about_slave(reader: &mut Reader<'_>, slave: &Slave, key: &str, fault: Fault) {
     let path = format!("slave.{}.{key}", slave.address);
     let address = format!("slave.{}.address", slave.address);
     about(reader, &path, &[&format!("master.{key}"), &address], fault);
@@ -147,17 +155,6 @@ fn isochronous_rate(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     }
 }
 
-fn device_rates(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let rate = facts.scenario.bus.params.rate;
-    for slave in facts.scenario.configured().filter(|slave| !slave.device.works_at(rate)) {
-        let all = BitRate::ALL.iter().filter(|&&rate| rate >= BitRate::M1_5 && slave.device.works_at(rate));
-        let fault = Fault::new(format!("slave {} does not work at {rate}", slave.address))
-            .rule(format!("bit rates of {} (its GSD file)", slave.device.name))
-            .help(all.map(|rate| format!("\"{rate}\"")).collect::<Vec<_>>().join(", "));
-        about(reader, "bus.rate", &[], fault);
-    }
-}
-
 fn bus_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let bus = &facts.scenario.bus;
     if let Err(broken) = bus.params.check(Bus::propagation(bus.cable_mm)) {
@@ -208,19 +205,6 @@ fn t_dp_limits(facts: &Facts<'_>, reader: &mut Reader<'_>) {
             let fault = Fault::new(format!("T_DP = {t_dp} is out of the range of {}", slave.device.name))
                 .rule(format!("T_DP is {min} to {max} (manual 3.3.2)"))
                 .help(format!("t_dp = \"{}\"", t_dp.clamp(min, max)));
-            about(reader, "master.t_dp", &[], fault);
-        }
-    }
-}
-
-fn min_interval(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let t_dp = facts.scenario.master.t_dp;
-    for slave in facts.scenario.configured() {
-        let min = slave.device.min_interval;
-        if t_dp < min {
-            let fault = Fault::new(format!("T_DP = {t_dp} polls slave {} too often", slave.address))
-                .rule(format!("{min} between two polls of {} (GSD: Min_Slave_Intervall)", slave.device.name))
-                .help(format!("t_dp = \"{}\"", min.ceil_to(slave.device.dp_grid())));
             about(reader, "master.t_dp", &[], fault);
         }
     }
@@ -570,10 +554,10 @@ fn subscribers(facts: &Facts<'_>, reader: &mut Reader<'_>) {
             Some(slave) if !slave.device.subscriber => Fault::new(format!("slave {} cannot subscribe", slave.address))
                 .rule(format!("{} has no subscriber function (its profile, manual 3.4)", slave.device.name))
                 .help("subscriber-drive can"),
-            Some(_) if earlier.iter().any(|e| (e.publisher, e.subscriber) == (link.publisher, link.subscriber)) => {
+            Some(_) if earlier.iter().any(|e| is_pair(e, link) && e.table == link.table) => {
                 Fault::new(format!("slave {} has this publisher already", link.subscriber))
-                    .rule("one link per publisher and subscriber (Model: D26 counts latencies by this pair)")
-                    .help("one link whose sample holds both")
+                    .rule("one link per publisher, subscriber and table (Model: D26 counts latencies by the pair)")
+                    .help("one link with both: samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]")
             }
             Some(_) => continue,
         };
@@ -594,65 +578,126 @@ fn no_slave(facts: &Facts<'_>, address: Address) -> Fault {
     Fault::new(message).help(format!("the slaves are {}", all.join(", ")))
 }
 
-fn samples(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+/// Whether two links are of the same publisher and subscriber.
+fn is_pair(one: &Link, other: &Link) -> bool {
+    (one.publisher, one.subscriber) == (other.publisher, other.subscriber)
+}
+
+/// Every sample with the path of its keys.
+fn all_samples<'a>(facts: &Facts<'a>, reader: &Reader<'_>) -> Vec<(String, &'a Link, Sample)> {
+    let mut all = Vec::new();
     for (path, link) in links(facts) {
-        let Some(publisher) = facts.scenario.slave(link.publisher) else { continue };
-        let (offset, length, inputs) = (u32::from(link.offset), u32::from(link.length), publisher.device.inputs);
+        let listed = reader.place(&[&format!("{path}.samples")]) != Place::Missing;
+        for (i, &sample) in link.samples.iter().enumerate() {
+            all.push((if listed { format!("{path}.samples.{}", i + 1) } else { path.clone() }, link, sample));
+        }
+    }
+    all
+}
+
+/// Length of the publisher's data as Set_Prm says it, and who says so.
+fn told_length<'a>(facts: &Facts<'a>, link: &Link) -> Option<(u8, &'a str)> {
+    let publisher = facts.scenario.slave(link.publisher)?;
+    Some(
+        link.publisher_length
+            .map_or((publisher.device.inputs, &*publisher.device.name), |told| (told, "publisher_length")),
+    )
+}
+
+fn samples(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (path, link, sample) in all_samples(facts, reader) {
+        let Some((inputs, whose)) = told_length(facts, link) else { continue };
+        let (offset, length) = (u32::from(sample.offset), u32::from(sample.length));
         if length == 0 || offset + length > u32::from(inputs) {
             let fault = Fault::new(format!(
                 "a sample of {length} octets from octet {offset} on is not in the publisher's data"
             ))
             .rule(format!(
-                "length >= 1 and offset {offset} + length {length} <= {inputs} octets of {} (DXB link table)",
-                publisher.device.name
+                "length >= 1 and offset {offset} + length {length} <= {inputs} octets of {whose} (DXB link table)"
             ))
             .help("offset = 4, length = 4 is G1_XIST1 of telegram 81");
-            about(reader, &format!("{path}.length"), &[&format!("{path}.offset"), &format!("{path}.publisher")], fault);
+            let publisher = format!("link.{}.publisher", number_of(&path));
+            about(reader, &format!("{path}.length"), &[&format!("{path}.offset"), &publisher], fault);
+        }
+    }
+}
+
+/// The number of the link that `path` belongs to.
+fn number_of(path: &str) -> &str {
+    path.split('.').nth(1).unwrap_or_default()
+}
+
+fn sample_lengths(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (path, link, sample) in all_samples(facts, reader) {
+        let Some(subscriber) = facts.scenario.slave(link.subscriber) else { continue };
+        let longest = subscriber.device.dxb.data;
+        if sample.length > longest {
+            let fault = Fault::new(format!("slave {} takes no sample of {} octets", link.subscriber, sample.length))
+                .rule(format!("length <= {longest} octets of {} (DXB_Max_Data_Length)", subscriber.device.name));
+            about(reader, &format!("{path}.length"), &[], fault);
+        }
+    }
+}
+
+/// Where the samples of the subscriber table go.
+fn destinations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let mut taken: Vec<(Address, u8, std::ops::Range<u16>)> = Vec::new();
+    for (path, link, sample) in all_samples(facts, reader) {
+        let (Some(slot), Some(subscriber)) = (link.slot(), facts.scenario.slave(link.subscriber)) else { continue };
+        let (limits, name) = (subscriber.device.dxb, &subscriber.device.name);
+        let to = u16::from(sample.to)..u16::from(sample.to) + u16::from(sample.length);
+        if slot > limits.slots {
+            let fault = Fault::new(format!("slave {} has no slot {slot} for samples", link.subscriber))
+                .rule(format!("slot 1 to {} of {name} (its profile)", limits.slots));
+            about(reader, &format!("link.{}.slot", number_of(&path)), &[], fault);
+        } else if to.end > limits.data.into() {
+            let fault = Fault::new(format!(
+                "{} octets from octet {} on are not in the slot's data area",
+                sample.length, to.start
+            ))
+            .rule(format!("to + length <= {} octets of {name} (its profile)", limits.data));
+            about(reader, &format!("{path}.to"), &[&format!("{path}.length")], fault);
+        } else if let Some((.., other)) = taken.iter().find(|(station, number, other)| {
+            (*station, *number) == (link.subscriber, slot) && other.start < to.end && to.start < other.end
+        }) {
+            let fault =
+                Fault::new(format!("octets {} to {} of slot {slot} are taken already", other.start, other.end - 1))
+                    .rule(format!(
+                        "no two samples of slave {} go to the same octet (Model: its slots)",
+                        link.subscriber
+                    ))
+                    .help(format!("for example to = {}", other.end));
+            let publisher = format!("link.{}.publisher", number_of(&path));
+            about(reader, &format!("{path}.to"), &[&format!("{path}.offset"), &publisher], fault);
+        }
+        taken.push((link.subscriber, slot, to));
+    }
+}
+
+/// A publisher's data have one length, and its subscriber knows one.
+fn told_lengths(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (i, (path, link)) in links(facts).enumerate() {
+        let Some((told, _)) = told_length(facts, link) else { continue };
+        let others = facts.scenario.links[..i].iter().filter(|other| is_pair(other, link));
+        let other = others.filter_map(|other| told_length(facts, other)).find(|&(other, _)| other != told);
+        if let Some((other, _)) = other {
+            let fault = Fault::new(format!("slave {} would know two lengths of its publisher's data", link.subscriber))
+                .rule("all links of a pair say the same publisher_length (Model: a publisher has one)")
+                .help(format!("publisher_length = {other} here too"));
+            about(reader, &format!("{path}.publisher_length"), &[&format!("{path}.publisher")], fault);
         }
     }
 }
 
 fn link_counts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
-        let mut own = links(facts).filter(|(_, link)| link.subscriber == slave.address);
-        let max = usize::from(slave.device.max_links);
-        if let Some((path, _)) = own.nth(max) {
-            let source = if slave.user_prm.is_empty() { "VPC3+C manual" } else { "GSD: DXB_Max_Link_Count" };
-            let fault = Fault::new(format!("slave {} has more than {max} links", slave.address))
-                .rule(format!("a subscriber has up to {max} links ({source})"));
-            about(reader, &format!("{path}.subscriber"), &[], fault);
-        }
-    }
-}
-
-/// Blocks and links fit into what the device takes.
-fn set_prm_length(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
-        let octets = build::set_prm(facts.scenario, slave).len() - 7;
-        if octets > slave.device.max_prm.into() {
-            let fault = Fault::new(format!("slave {} would get {octets} octets of user parameters", slave.address))
-                .rule(format!(
-                    "{} takes {} octets (GSD: Max_User_Prm_Data_Len)",
-                    slave.device.name, slave.device.max_prm
-                ))
-                .help("a link takes 4 octets; is the GSD file right?");
-            about_slave(reader, slave, "device", fault);
-        }
-    }
-}
-
-/// Parameters are asked of devices that answer.
-fn acyclic_devices(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for (i, event) in facts.scenario.events.iter().enumerate() {
-        if !matches!(event.action, Action::ReadParameter { .. } | Action::ChangeParameter { .. }) {
-            continue;
-        }
-        let mut slaves = event.slaves.iter().filter_map(|&address| configured(facts, address));
-        if let Some(slave) = slaves.find(|slave| !slave.device.acyclic && !slave.user_prm.is_empty()) {
-            let fault = Fault::new(format!("slave {} takes no acyclic requests", slave.address))
-                .rule(format!("{} has no C1_Read_Write_supp (its GSD file)", slave.device.name));
-            let path = format!("event.{}", i + 1);
-            about(reader, &format!("{path}.slave"), &[&format!("{path}.slaves")], fault);
+        let most = usize::from(slave.device.dxb.links);
+        let all = all_samples(facts, reader);
+        let mut own = all.iter().filter(|(_, link, _)| link.subscriber == slave.address);
+        if let Some((path, ..)) = own.nth(most) {
+            let fault = Fault::new(format!("slave {} has more than {most} links", slave.address))
+                .rule(format!("a subscriber has up to {most} links, each sample is one (DXB_Max_Link_Count)"));
+            about(reader, &format!("link.{}.subscriber", number_of(path)), &[], fault);
         }
     }
 }
@@ -727,7 +772,7 @@ fn start_up(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 impl Action {
     /// Whether an event with this action names slaves.
     pub(super) const fn about_slaves(self) -> bool {
-        !matches!(self, Self::Clear | Self::Operate)
+        !matches!(self, Self::Clear | Self::Operate | Self::Control(_))
     }
 }
 

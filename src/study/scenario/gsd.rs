@@ -1,11 +1,14 @@
 //! Devices from GSD files: `device = { gsd = "file", module = "name" }` and `prm = { "name" = value }` of a slave.
 
+use super::check::{Facts, about, about_slave};
 use super::error::{Fault, Problem};
 use super::section::{Reader, Section, choice, text};
 use super::tree::{Node, Value};
-use super::{CodeSequence, Scaling, Slave};
+use super::{Action, CodeSequence, Scaling, Slave};
 use crate::device::profile::{Device, PROFILES};
+use crate::study::build;
 use crate::study::gsd::{Gsd, Touched, UserPrm};
+use crate::time::BitRate;
 use crate::wire::prm::{EncoderOptions, UserPrm81};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -190,5 +193,49 @@ impl Chosen {
         slave.max_life_failures = octets[9];
         slave.functions = options.activate();
         slave.code_sequence = if options.counter_clockwise() { CodeSequence::Ccw } else { CodeSequence::Cw };
+    }
+}
+
+/// Every slave works at the bit rate.
+pub(super) fn device_rates(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let rate = facts.scenario.bus.params.rate;
+    for slave in facts.scenario.configured().filter(|slave| !slave.device.works_at(rate)) {
+        let all = BitRate::ALL.iter().filter(|&&rate| rate >= BitRate::M1_5 && slave.device.works_at(rate));
+        let fault = Fault::new(format!("slave {} does not work at {rate}", slave.address))
+            .rule(format!("bit rates of {} (its GSD file)", slave.device.name))
+            .help(all.map(|rate| format!("\"{rate}\"")).collect::<Vec<_>>().join(", "));
+        about(reader, "bus.rate", &[], fault);
+    }
+}
+
+/// Blocks and links fit into what the device takes.
+pub(super) fn set_prm_length(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for slave in facts.scenario.configured() {
+        let octets = build::set_prm(facts.scenario, slave).len() - 7;
+        if octets > slave.device.max_prm.into() {
+            let fault = Fault::new(format!("slave {} would get {octets} octets of user parameters", slave.address))
+                .rule(format!(
+                    "{} takes {} octets (GSD: Max_User_Prm_Data_Len)",
+                    slave.device.name, slave.device.max_prm
+                ))
+                .help("an entry of the link table takes 4 octets; is the GSD file right?");
+            about_slave(reader, slave, "device", fault);
+        }
+    }
+}
+
+/// Parameters are asked of devices that answer.
+pub(super) fn acyclic_devices(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (i, event) in facts.scenario.events.iter().enumerate() {
+        if !matches!(event.action, Action::ReadParameter { .. } | Action::ChangeParameter { .. }) {
+            continue;
+        }
+        let slaves = event.slaves.iter().filter_map(|&address| facts.scenario.slave(address));
+        if let Some(slave) = slaves.into_iter().find(|slave| !slave.device.acyclic && !slave.user_prm.is_empty()) {
+            let fault = Fault::new(format!("slave {} takes no acyclic requests", slave.address))
+                .rule(format!("{} has no C1_Read_Write_supp (its GSD file)", slave.device.name));
+            let path = format!("event.{}", i + 1);
+            about(reader, &format!("{path}.slave"), &[&format!("{path}.slaves")], fault);
+        }
     }
 }
