@@ -39,8 +39,6 @@ pub type Drive = Unit<Subscriber>;
 pub struct Subscriber {
     own: Address,
     limits: DxbLimits,
-    /// Whether it takes user blocks besides its links.
-    user_blocks: bool,
     links: Links,
     /// How each link is, in the order of the links.
     conditions: Vec<Condition>,
@@ -96,7 +94,6 @@ impl Subscriber {
         Self {
             own,
             limits: profile.dxb,
-            user_blocks: false,
             links: Links::default(),
             conditions: Vec::new(),
             data: Vec::new(),
@@ -106,13 +103,6 @@ impl Subscriber {
             publishers: 0,
             revision: 0,
         }
-    }
-    /// The same, which takes blocks of user parameters besides its links, or does not. Model: what a manufacturer's user
-    /// parameters do is not known; they do nothing here.
-    #[must_use]
-    pub const fn with_user_blocks(mut self, user_blocks: bool) -> Self {
-        self.user_blocks = user_blocks;
-        self
     }
     /// What the link table brought, its samples one behind the other; zeros before the first.
     pub fn link_data(&self) -> &[u8] {
@@ -162,10 +152,10 @@ impl Subscriber {
 
 impl Function for Subscriber {
     fn check(&self, prm: &SetPrm<'_>) -> Result<(), Refusal> {
-        Links::of(prm, self.own, self.limits, self.user_blocks).map(|_| ())
+        Links::of(prm, self.own, self.limits).map(|_| ())
     }
     fn parameterise(&mut self, prm: &SetPrm<'_>, watchdog: Option<Span>) {
-        self.links = Links::of(prm, self.own, self.limits, self.user_blocks).unwrap_or_default();
+        self.links = Links::of(prm, self.own, self.limits).unwrap_or_default();
         self.conditions = vec![Condition::NEW; self.links.iter().len()];
         self.data = vec![0; self.links.octets()];
         self.publishers = self.links.iter().fold(0, |all, link| all | 1 << link.publisher.get());

@@ -56,13 +56,12 @@ struct Entry {
 }
 
 impl Links {
-    /// The links that `prm` asks of the subscriber at `own`, which has these limits and takes user blocks besides, or
-    /// does not.
+    /// The links that `prm` asks of the subscriber at `own`, which has these limits.
     ///
     /// # Errors
     /// The first rule that is broken, with its octet.
-    pub fn of(prm: &SetPrm<'_>, own: Address, limits: DxbLimits, user_blocks: bool) -> Result<Self, Refusal> {
-        let entries = entries(prm, limits, user_blocks)?;
+    pub fn of(prm: &SetPrm<'_>, own: Address, limits: DxbLimits) -> Result<Self, Refusal> {
+        let entries = entries(prm, limits)?;
         for (at, entry) in entries.iter().enumerate() {
             entry.check(own, limits)?;
             entry.check_with(&entries[..at])?;
@@ -135,14 +134,14 @@ impl Links {
 
 /// All entries of both tables in the order of the octets. Each table is there once at most, and nothing else but the
 /// isochronous block.
-fn entries(prm: &SetPrm<'_>, limits: DxbLimits, user_blocks: bool) -> Result<Vec<Entry>, Refusal> {
+fn entries(prm: &SetPrm<'_>, limits: DxbLimits) -> Result<Vec<Entry>, Refusal> {
     let mut all = Vec::new();
     let mut seen: [Option<BlockType>; 2] = [None; 2];
     for block in prm.blocks() {
         let block = block?;
         match block.kind {
             BlockType::IsoM => continue,
-            BlockType::User if user_blocks => continue,
+            BlockType::User if limits.user_blocks => continue,
             BlockType::DxbLinks | BlockType::DxbSubscriptions => {}
             kind => {
                 let rule = "this device takes isochronous, link table and subscriber table blocks only";
@@ -236,7 +235,7 @@ mod tests {
     use crate::wire::prm::{DpV1Status, DxbSubscription, PrmBuilder, PrmRule, StationStatus};
 
     const OWN: Address = Address::new(9).unwrap();
-    const LIMITS: DxbLimits = DxbLimits { links: 4, data: 20, slots: 2 };
+    const LIMITS: DxbLimits = DxbLimits { links: 4, data: 20, slots: 2, user_blocks: false };
 
     const fn link(publisher: u8, length: u8, offset: u8, sample: u8) -> DxbLink {
         DxbLink { publisher, length, offset, sample }
@@ -266,7 +265,7 @@ mod tests {
         built.octets().to_vec()
     }
     fn of(du: &[u8]) -> Result<Links, Refusal> {
-        Links::of(&SetPrm::parse(du).unwrap(), OWN, LIMITS, false)
+        Links::of(&SetPrm::parse(du).unwrap(), OWN, LIMITS)
     }
     /// Octet and value of the refusal.
     fn refused(du: &[u8]) -> (usize, u64) {
@@ -352,7 +351,7 @@ mod tests {
         let mut user = octets(&links[..1], &[], true);
         user.extend([4, 0x81, 0, 0]);
         assert_eq!(refused(&user), (21, 0x81));
-        let taken = Links::of(&SetPrm::parse(&user).unwrap(), OWN, LIMITS, true);
+        let taken = Links::of(&SetPrm::parse(&user).unwrap(), OWN, DxbLimits { user_blocks: true, ..LIMITS });
         assert!(taken.is_ok_and(|links| links.iter().len() == 1), "a device that takes user blocks");
     }
 

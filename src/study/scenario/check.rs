@@ -3,6 +3,7 @@
 
 use super::class2;
 use super::error::Fault;
+use super::gsd;
 use super::kinds::jitter_bound;
 use super::section::Reader;
 use super::services;
@@ -31,7 +32,7 @@ pub(super) struct Facts<'a> {
 const STAGES: &[&[Rule]] = &[
     &[some_slave, own_addresses, addresses_within_hsa, wiring, crystals, run_length],
     &[class2::slaves],
-    &[isochronous_rate, bus_parameters, device_max_tsdr, own_t_sdr],
+    &[isochronous_rate, gsd::device_rates, bus_parameters, device_max_tsdr, own_t_sdr],
     &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
     &[services::slave_interval, services::data_control_time, services::sync_and_freeze],
     &[encoder_parameters, resolution],
@@ -40,7 +41,8 @@ const STAGES: &[&[Rule]] = &[
     &[functions, code_sequence, units_per_rev, total_range, jitter_fits, cycles_fit],
     &[publishers, subscribers, samples, link_counts, link_watchdog],
     &[sample_lengths, destinations, told_lengths],
-    &[event_stations, event_instants, disturbance_stations, services::commands],
+    &[gsd::set_prm_length],
+    &[event_stations, gsd::acyclic_devices, event_instants, disturbance_stations, services::commands],
     &[start_up],
 ];
 
