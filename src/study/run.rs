@@ -155,7 +155,7 @@ pub fn run<Q: Queue<NetworkEvent>>(
     conclude(scenario, summary, &counts, sinks, (&fingerprints, bus.as_ref()), dir)
 }
 
-/// Adds the fingerprints, the LEDs and the topology, then writes the files.
+/// Adds the fingerprints, the LEDs, the receptions and the topology, then writes the files.
 fn conclude(
     scenario: &Scenario,
     mut summary: Summary,
@@ -181,6 +181,8 @@ fn conclude(
         summary.topology = map.text(false);
     }
     summary.warnings = scenario.warnings();
+    summary.show_receptions(counts);
+    summary.show_acyclic(counts);
 
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {
@@ -245,7 +247,7 @@ fn facts(scenario: &Scenario) -> Facts {
         bit_rate: scenario.bus.params.rate,
         seed: scenario.run.seed,
         slaves: slaves
-            .map(|slave| SlaveFacts { device: slave.device.name.to_owned(), t_o: Some(slave.times.t_o) })
+            .map(|slave| SlaveFacts { device: slave.device.name.clone().into_owned(), t_o: Some(slave.times.t_o) })
             .collect(),
         fingerprint: Vec::new(),
     }

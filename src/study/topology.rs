@@ -176,8 +176,9 @@ impl Segment {
 /// The stations of the segment `index`, from the beginning of the cable to its end.
 fn stations(scenario: &Scenario, index: u8) -> Vec<Station> {
     let master = [(scenario.master.address, "master")];
-    let slaves = scenario.slaves.iter().map(|slave| (slave.address, slave.device.name));
-    let all = master.into_iter().chain(slaves);
+    let class2 = scenario.class2.iter().map(|class2| (class2.address, "class 2 master"));
+    let slaves = scenario.slaves.iter().map(|slave| (slave.address, slave.device.name.as_ref()));
+    let all = master.into_iter().chain(class2).chain(slaves);
     let here = all.filter_map(|(address, device)| {
         let Point { segment, mm } = scenario.point(address)?;
         let delay = scenario.delay(scenario.master.address, address);

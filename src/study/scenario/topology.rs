@@ -188,6 +188,9 @@ impl Scenario {
         if master.address == address {
             return Some(Point { segment: master.segment, mm: master.position_mm });
         }
+        if let Some(class2) = self.class2.iter().find(|class2| class2.address == address) {
+            return Some(Point { segment: class2.segment, mm: class2.position_mm });
+        }
         self.slave(address).map(|slave| Point { segment: slave.segment, mm: slave.position_mm })
     }
     /// How long a telegram takes between two stations, without jitter; no time if one of them does not exist.
@@ -200,7 +203,8 @@ impl Scenario {
     }
     /// Loads of the segment with this index: the stations on it, silent ones too, and what else is connected to it.
     pub fn loads(&self, segment: u8) -> usize {
-        let stations = self.slaves.iter().filter(|slave| slave.segment == segment).count();
+        let masters = self.class2.iter().filter(|class2| class2.segment == segment).count();
+        let stations = masters + self.slaves.iter().filter(|slave| slave.segment == segment).count();
         let ends = self.topology.repeaters.iter().flat_map(|repeater| repeater.ends);
         let ends = ends.filter(|end| end.segment == segment).count();
         stations + ends + usize::from(self.master.segment == segment)
@@ -443,8 +447,11 @@ pub(super) fn spread<'t>(topology: &Topology, slaves: impl Iterator<Item = &'t T
 /// Rule: no station and no repeater sits beyond the end of its cable.
 pub(super) fn positions(scenario: &Scenario, reader: &mut Reader<'_>) {
     let master = [(scenario.master.address, "master.position".to_owned())];
+    let class2 =
+        scenario.class2.iter().enumerate().map(|(i, other)| (other.address, format!("class2.{}.position", i + 1)));
     let slaves = scenario.slaves.iter().map(|slave| (slave.address, format!("slave.{}.position", slave.address)));
-    let stations = slaves.chain(master).filter_map(|(address, key)| Some((scenario.point(address)?, key)));
+    let stations =
+        slaves.chain(master).chain(class2).filter_map(|(address, key)| Some((scenario.point(address)?, key)));
     let repeaters = scenario.topology.repeaters.iter().enumerate();
     let ends = repeaters.flat_map(|(i, repeater)| {
         let [from, to] = ["from_position", "to_position"].map(|key| format!("repeater.{}.{key}", i + 1));
