@@ -7,6 +7,7 @@ mod encoder;
 mod encoder_scenarios;
 mod foreign;
 mod golden;
+mod interop;
 mod layers;
 mod manual;
 mod options;
