@@ -378,6 +378,13 @@ pub enum Observation {
         /// Why.
         cause: SlaveCause,
     },
+    /// Sync or Freeze mode of a slave changed.
+    Held {
+        /// Outputs wait for Sync.
+        outputs: bool,
+        /// Inputs are held.
+        inputs: bool,
+    },
     /// A start-up phase was entered.
     Phase {
         /// Before.
@@ -566,6 +573,10 @@ impl fmt::Display for Observation {
             }
             Self::AcyclicFailed { slave, why } => write!(f, "slave {slave}: acyclic request failed, {why}"),
             Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
+            Self::Held { outputs, inputs } => {
+                let word = |on: bool| if on { "on" } else { "off" };
+                write!(f, "Sync mode {}, Freeze mode {}", word(*outputs), word(*inputs))
+            }
             Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
             Self::Clock { verdict, error, window, counter, .. } => {
                 write!(f, "clock {verdict}, error {error}, window {window}, failure counter {counter}")

@@ -3,6 +3,7 @@
 mod cli;
 mod determinism;
 mod devices;
+mod dp_services;
 mod encoder;
 mod encoder_scenarios;
 mod foreign;

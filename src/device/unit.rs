@@ -8,7 +8,7 @@
 use crate::device::isochronous::{IsoSettings, Isochronous};
 use crate::device::leds::{LedInput, LedLogic};
 use crate::device::options::UnitOptions;
-use crate::device::profile::Profile;
+use crate::device::profile::Device;
 use crate::device::sensor::{Answer, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
 use crate::dp::ms1::Records;
 use crate::dp::slave::{Application, Identity, Refusal, Slave};
@@ -17,6 +17,7 @@ use crate::observation::{self, Leds, Observation, Phase, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::Address;
 use crate::wire::acyclic::{ErrorCode, Record};
+use crate::wire::diag::DiagBuffer;
 use crate::wire::drive::{G1Zsw, Inputs81, Outputs81, SensorFault, Zsw2};
 use crate::wire::prm::{Block, BlockType, IsoM, SetPrm};
 
@@ -55,6 +56,12 @@ pub trait Function {
     }
     /// Data exchange is over.
     fn leave(&mut self, _out: &mut Outbox) {}
+    /// Writes the device's own part of the diagnosis.
+    fn diagnosis(&self, _diagnosis: &mut DiagBuffer) {}
+    /// Another number than before whenever [`diagnosis`](Self::diagnosis) writes something else.
+    fn diagnosis_revision(&self) -> u32 {
+        0
+    }
 }
 
 /// What is set at a unit, not by its master.
@@ -88,7 +95,7 @@ pub struct Unit<F> {
 /// The unit behind its DP slave.
 #[derive(Clone, Debug)]
 struct Body<F> {
-    profile: &'static Profile,
+    profile: Device,
     settings: UnitSettings,
     iso: Option<Isochronous>,
     sensor: Sensor,
@@ -107,15 +114,19 @@ struct Body<F> {
 
 impl<F: Function> Unit<F> {
     /// A unit of this kind without supply.
-    pub fn new(profile: &'static Profile, settings: UnitSettings, function: F) -> Self {
+    pub fn new(profile: impl Into<Device>, settings: UnitSettings, function: F) -> Self {
+        let profile = profile.into();
         let identity = Identity {
             address: settings.address,
             ident: profile.ident,
-            config: profile.config,
+            config: profile.config.clone(),
             outputs: profile.outputs,
             inputs: profile.inputs,
             fail_safe: profile.fail_safe,
             publisher: profile.publisher,
+            sync: profile.sync,
+            freeze: profile.freeze,
+            max_diag: profile.max_diag,
             rate: settings.rate,
             t_sdr: settings.t_sdr,
         };
@@ -371,6 +382,19 @@ impl<F: Function> Application for Body<F> {
             self.latch(sample, false, out);
         }
     }
+    fn transfer(&mut self, _now: Local, outputs: Option<&[u8]>, out: &mut Outbox) {
+        self.outputs = outputs.and_then(Outputs81::parse).unwrap_or_default();
+        // Once the clock is locked, T_O takes them over.
+        if !self.is_locked() {
+            self.take_over(out);
+        }
+    }
+    fn freeze(&mut self, _now: Local, sample: u32, out: &mut Outbox) {
+        // Once the clock is locked, what is held was latched at T_I.
+        if !self.is_locked() {
+            self.latch(sample, false, out);
+        }
+    }
     fn inputs(&self, du: &mut [u8]) {
         du.copy_from_slice(&self.inputs.emit());
     }
@@ -388,6 +412,12 @@ impl<F: Function> Application for Body<F> {
     }
     fn publishers(&self) -> u128 {
         self.function.publishers()
+    }
+    fn diagnosis(&self, diagnosis: &mut DiagBuffer) {
+        self.function.diagnosis(diagnosis);
+    }
+    fn diagnosis_revision(&self) -> u32 {
+        self.function.diagnosis_revision()
     }
 }
 

@@ -1,6 +1,7 @@
 //! DP: the services of the master and the slave, their state machines and the isochronous cycle.
 
 pub mod handler;
+pub mod image;
 pub mod iso;
 pub mod master;
 pub mod ms1;

@@ -81,7 +81,7 @@ fn user_block(slave: &Slave) -> UserPrm81 {
 }
 
 fn iso_block(scenario: &Scenario, slave: &Slave) -> IsoM {
-    let device = slave.device;
+    let device = &slave.device;
     let units = |span: Span| (span.ticks() / Span::TICKS_PER_ISO_UNIT) as u32;
     let t_dx = Plan::of(scenario).t_dx_told();
     IsoM {
@@ -183,9 +183,9 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let machine = if slave.silent {
         Node::Silent(slave.address)
     } else if slave.device.subscriber {
-        Node::Drive(Drive::new(slave.device, settings, Subscriber::default()))
+        Node::Drive(Drive::new(&slave.device, settings, Subscriber::default()))
     } else {
-        Node::Encoder(Encoder::new(slave.device, settings, Disc::new(slave.device, &slave.options)))
+        Node::Encoder(Encoder::new(&slave.device, settings, Disc::new(&slave.device, &slave.options)))
     };
     let Resolution { steps_per_rev, revolutions } = slave.resolution();
     let resolution = motion::Resolution::new(steps_per_rev, revolutions);

@@ -23,13 +23,13 @@ pub fn list() -> String {
     let mut lines = aligned(&header, &[0, 9], &rows);
 
     let answers =
-        |profile: &Profile| std::iter::once(profile.name.to_owned()).chain(max_tsdr(profile)).collect::<Vec<_>>();
+        |profile: &Profile| std::iter::once(profile.name.to_string()).chain(max_tsdr(profile)).collect::<Vec<_>>();
     let header: Vec<_> = std::iter::once("MaxTsdr [t_bit]").chain(rates()).collect();
     lines.push(String::new());
     lines.extend(aligned(&header, &[0], &PROFILES.iter().map(answers).collect::<Vec<_>>()));
 
     lines.push(String::new());
-    let titles = |profile: &Profile| vec![profile.name.to_owned(), profile.title.to_owned()];
+    let titles = |profile: &Profile| vec![profile.name.to_string(), profile.title.to_string()];
     lines.extend(aligned(&["name", "what it is"], &[0, 1], &PROFILES.iter().map(titles).collect::<Vec<_>>()));
     lines.push(String::new());
     lines.push("in, out: octets; rates in bit/s; everything about one device: isodp devices NAME".to_owned());
@@ -42,7 +42,7 @@ pub fn list() -> String {
 /// There is no such device.
 pub fn full(name: &str) -> Result<String, UnknownDevice> {
     let Some(profile) = profile::find(name) else {
-        let help = suggestion(name, PROFILES.iter().map(|profile| profile.name));
+        let help = suggestion(name, PROFILES.iter().map(|profile| &*profile.name));
         return Err(UnknownDevice { name: name.chars().take(40).collect(), help });
     };
     let mut lines = vec![format!("{}: {}", profile.name, profile.title), String::new()];
@@ -74,7 +74,7 @@ fn max_tsdr(profile: &Profile) -> impl Iterator<Item = String> {
 
 fn limits(profile: &Profile) -> Vec<String> {
     vec![
-        profile.name.to_owned(),
+        profile.name.to_string(),
         format!("{:04X}", profile.ident),
         profile.inputs.to_string(),
         profile.outputs.to_string(),
@@ -115,7 +115,7 @@ fn facts(profile: &Profile) -> Vec<(&'static str, String)> {
         ("resolution", format!("{} steps in a revolution, {} revolutions", profile.steps_per_rev, profile.revolutions)),
         ("function", function(profile).to_owned()),
         ("empty Data_Exchange", if profile.fail_safe { "means Clear (Fail_Safe)" } else { "is refused" }.to_owned()),
-        ("source", profile.source.to_owned()),
+        ("source", profile.source.to_string()),
     ]
 }
 

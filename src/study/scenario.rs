@@ -18,7 +18,7 @@ mod tree;
 pub use error::{Fault, Position, Problem, ScenarioError};
 
 use crate::device::options::{Resolution, UnitOptions};
-use crate::device::profile::Profile;
+use crate::device::profile::Device;
 pub use crate::dp::handler::{Patch, StartupTelegram};
 use crate::fdl::params::BusParams;
 pub use crate::sim::fault::{Bursts, Disturbance, Service};
@@ -296,7 +296,7 @@ pub struct Slave {
     /// Its address, 0..=125.
     pub address: Address,
     /// What it is.
-    pub device: &'static Profile,
+    pub device: Device,
     /// Where on the cable it sits (mm).
     pub position_mm: u64,
     /// How far its crystal is off.
@@ -498,12 +498,13 @@ pub(crate) mod tests {
     use crate::time::BitRate;
 
     /// `n` slaves of the kind `device` from address 3 on at a bus without length, T_DP 8 ms.
-    pub(crate) fn network(rate: BitRate, device: &'static Profile, n: u8) -> Scenario {
+    pub(crate) fn network(rate: BitRate, device: impl Into<Device>, n: u8) -> Scenario {
+        let device = device.into();
         let address = |number| Address::new(number).unwrap();
         let (t_i, t_o, t_pll_w) = (Span::from_us(125), Span::from_ms(4), Span::from_us(1));
         let slave = |number| Slave {
             address: address(number),
-            device,
+            device: device.clone(),
             position_mm: 0,
             crystal: Crystal::Offset(0),
             t_sdr: Tbit(30),

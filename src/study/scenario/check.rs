@@ -297,7 +297,7 @@ fn t_i_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 fn t_o_minimum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let t_dx = facts.plan.t_dx_told();
     for slave in facts.scenario.configured() {
-        let min = facts.plan.t_o_min(slave.device);
+        let min = facts.plan.t_o_min(&slave.device);
         if slave.times.t_o < min {
             let t_o_min = slave.device.t_o_min;
             let fault = Fault::new(format!("T_O = {} is too early for slave {}", slave.times.t_o, slave.address))
@@ -316,7 +316,7 @@ fn t_o_maximum(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let t_dp = facts.scenario.master.t_dp;
     for slave in facts.scenario.configured() {
         let (times, gap_min) = (&slave.times, slave.device.gap_min(slave.functions));
-        let (min, max) = (facts.plan.t_o_min(slave.device), facts.plan.t_o_max(slave, t_dp));
+        let (min, max) = (facts.plan.t_o_min(&slave.device), facts.plan.t_o_max(slave, t_dp));
         if times.t_o > max {
             let gap = t_dp - times.t_i - times.t_o;
             let message = if gap < Span::ZERO {
@@ -680,8 +680,9 @@ impl Action {
 fn shortest_t_dp(facts: &Facts<'_>) -> String {
     let needed = |slave: &Slave| {
         let gap = slave.device.gap_min(slave.functions);
-        let times = facts.plan.t_o_min(slave.device) + gap + slave.times.t_i.max(slave.device.t_i_min(slave.functions));
-        facts.plan.t_dp_min(slave.device).max(times.ceil_to(slave.device.dp_grid()))
+        let times =
+            facts.plan.t_o_min(&slave.device) + gap + slave.times.t_i.max(slave.device.t_i_min(slave.functions));
+        facts.plan.t_dp_min(&slave.device).max(times.ceil_to(slave.device.dp_grid()))
     };
     let shortest = facts.scenario.configured().map(needed).max().unwrap_or_default();
     format!("the shortest is t_dp = \"{shortest}\"")

@@ -9,7 +9,7 @@ use super::{
     Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Link, Master, Record, Run, Scaling,
     Scenario, Slave, Watchdog, When,
 };
-use crate::device::profile::{PROFILES, Profile};
+use crate::device::profile::{Device, PROFILES, Profile};
 use crate::fdl::params::BusParams;
 use crate::sim::motion::{Angle, Motion};
 use crate::sim::noise::GcJitter;
@@ -418,7 +418,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let mut section = Section::new(format!("slave.{}", from.address), from.place, Some(&from.table));
     let s = &mut section;
     let device = s.required(reader, "device", &format!("\"{}\"", PROFILES[0].name), |node| {
-        choice(node, "device", PROFILES, |profile| profile.name)
+        choice(node, "device", PROFILES, |profile| &profile.name)
     });
     let position_mm = s.optional(reader, "position", cable).unwrap_or(context.position_mm);
     let crystal = crystal(reader, s);
@@ -440,8 +440,8 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
     section.finish(reader);
     let times = iso_times(reader, from, own.or(context.times), context.times.is_some());
-    let (device, bus) = (device?, context.bus?);
-    let t_sdr = t_sdr.unwrap_or_else(|| default_t_sdr(bus, device));
+    let (device, bus) = (Device::from(device?), context.bus?);
+    let t_sdr = t_sdr.unwrap_or_else(|| default_t_sdr(bus, &device));
     Some(Slave {
         address: from.address,
         device,
