@@ -290,6 +290,17 @@ pub enum Observation {
         /// From whom.
         slave: Address,
     },
+    /// A slave left data exchange against the master's will: it refused (RS), answered nonsense, or was silent for too
+    /// long. That the master starts over is told by `Handler`, too, and also where it does so of its own accord.
+    Lost {
+        /// Which.
+        slave: Address,
+    },
+    /// A slave's diagnosis was read. What it says is told by `Diagnosis`, if that is new.
+    DiagnosisRead {
+        /// Whose.
+        slave: Address,
+    },
     /// A slave's diagnosis as the master read it.
     Diagnosis {
         /// Whose.
@@ -518,7 +529,8 @@ pub struct Inputs {
 }
 
 impl Observation {
-    /// Whether this happens rarely and belongs into a log of events, rather than once or more in every cycle.
+    /// Whether this happens rarely and belongs into a log of events, rather than once or more in every cycle or in
+    /// words that another event has already.
     pub const fn is_event(&self) -> bool {
         !matches!(
             self,
@@ -531,6 +543,8 @@ impl Observation {
                 | Self::Subscribed { .. }
                 | Self::Used { .. }
                 | Self::Gap { .. }
+                | Self::Lost { .. }
+                | Self::DiagnosisRead { .. }
         )
     }
 }
@@ -548,6 +562,8 @@ impl fmt::Display for Observation {
             Self::Retry { slave } => write!(f, "slave {slave}: request repeated"),
             Self::NoAnswer { slave } => write!(f, "slave {slave}: no answer"),
             Self::IllegalAnswer { slave } => write!(f, "slave {slave}: illegal answer"),
+            Self::Lost { slave } => write!(f, "slave {slave}: left data exchange"),
+            Self::DiagnosisRead { slave } => write!(f, "slave {slave}: diagnosis read"),
             Self::Diagnosis { slave, status: [a, b, c] } => {
                 write!(f, "slave {slave}: diagnosis {a:02X} {b:02X} {c:02X}")
             }

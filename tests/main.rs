@@ -10,6 +10,7 @@ mod foreign;
 mod golden;
 mod interop;
 mod layers;
+mod live_list;
 mod manual;
 mod options;
 mod props;

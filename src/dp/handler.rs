@@ -177,6 +177,7 @@ impl Handler {
     }
     fn diagnosis(&mut self, du: &[u8], out: &mut Outbox) -> Option<DiagStatus> {
         let diagnosis = Diagnosis::parse(du).ok()?;
+        out.observe(Observation::DiagnosisRead { slave: self.params.address });
         let [a, b, c, ..] = diagnosis.emit();
         if self.reported != Some([a, b, c]) {
             self.reported = Some([a, b, c]);
@@ -191,6 +192,7 @@ impl Handler {
     }
     /// Data_Exchange was refused. Tells whether the slave was given up: always.
     pub fn refused(&mut self, out: &mut Outbox) -> bool {
+        out.observe(Observation::Lost { slave: self.params.address });
         self.enter(HandlerState::Diagnose, out);
         true
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::layout::Layout;
+use super::live_list::{CycleTimes, LiveList};
 use crate::observation::{ClockVerdict, Leds, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
@@ -14,6 +15,8 @@ pub struct Counts {
     pub network: NetworkCounts,
     /// Per slave, in address order.
     pub slaves: Vec<SlaveCounts>,
+    /// Per address, as a bus analyser counts.
+    pub live_list: LiveList,
 }
 
 /// What is counted for the network as a whole.
@@ -23,6 +26,8 @@ pub struct NetworkCounts {
     pub duration: Span,
     /// Cycles that began.
     pub cycles: u64,
+    /// How long they took.
+    pub cycle_times: CycleTimes,
     /// Requests that the master repeated.
     pub retries: u64,
     /// Requests that stayed without answer after all retries.
@@ -89,7 +94,7 @@ impl Counts {
     /// Nothing counted yet.
     pub fn new(layout: &Layout) -> Self {
         let slaves = layout.slaves().iter().map(|slave| SlaveCounts::new(slave.address)).collect();
-        Self { network: NetworkCounts::default(), slaves }
+        Self { network: NetworkCounts::default(), slaves, live_list: LiveList::new(layout) }
     }
 
     /// Counts what the master observed; `index` finds a slave.
@@ -115,8 +120,9 @@ impl Counts {
         }
     }
 
-    /// Counts what any station observed.
-    pub(super) fn station(&mut self, what: &Observation) {
+    /// Counts what any station, `observer`, observed.
+    pub(super) fn station(&mut self, observer: Address, what: &Observation) {
+        self.live_list.observe(observer, what);
         match what {
             Observation::Collision { .. } => self.network.collisions += 1,
             Observation::Disturbed { .. } => self.network.disturbed += 1,

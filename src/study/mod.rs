@@ -7,6 +7,7 @@ pub mod devices;
 pub mod export;
 pub mod histogram;
 pub mod layout;
+pub mod live_list;
 pub mod metric;
 pub mod plan;
 pub mod plot;
