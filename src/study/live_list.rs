@@ -53,7 +53,8 @@ impl Seen {
 pub struct Station {
     /// The worst it was seen as; none while nobody saw it or asked for it.
     pub seen: Option<Seen>,
-    /// Lost: how often it left data exchange against its master's will. A start anew that the master wants is none.
+    /// Lost: how often it left data exchange against its master's will. A start anew that the master wants is none. Of a
+    /// master: how often it did not take the token and left the ring.
     pub lost: u64,
     /// Syncs: how often it was brought into data exchange, the first time included. An analyser counts the start-ups that
     /// end with a Data_Exchange.
@@ -92,6 +93,8 @@ impl Station {
 #[derive(Clone, PartialEq, Debug)]
 pub struct LiveList {
     stations: Vec<Station>,
+    /// Whose cycles count.
+    master: Address,
     /// Cycles begun.
     cycles: u64,
 }
@@ -99,7 +102,7 @@ pub struct LiveList {
 impl LiveList {
     /// Nobody is seen yet; the slaves of the layout are looked for.
     pub fn new(layout: &Layout) -> Self {
-        let mut list = Self { stations: vec![Station::default(); 128], cycles: 0 };
+        let mut list = Self { stations: vec![Station::default(); 128], master: layout.master, cycles: 0 };
         for slave in layout.slaves() {
             list.station(slave.address).saw(Seen::Missing);
         }
@@ -121,8 +124,14 @@ impl LiveList {
     pub(super) fn observe(&mut self, observer: Address, what: &Observation) {
         let cycle = self.cycles;
         match *what {
-            Observation::CycleStart { .. } => self.cycles += 1,
-            Observation::TokenClaimed => self.station(observer).saw(Seen::Master),
+            Observation::CycleStart { .. } if observer == self.master => self.cycles += 1,
+            Observation::TokenClaimed | Observation::RingEntered => self.station(observer).saw(Seen::Master),
+            Observation::StationJoined { station } => self.station(station).saw(Seen::Master),
+            Observation::StationLost { station } => {
+                let station = self.station(station);
+                station.lost += 1;
+                station.saw(Seen::Master);
+            }
             Observation::Retry { slave } => self.station(slave).repeat(cycle),
             Observation::IllegalAnswer { slave } => self.station(slave).illegal += 1,
             Observation::Lost { slave } => {
