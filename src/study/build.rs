@@ -9,7 +9,7 @@ use crate::device::unit::UnitSettings;
 use crate::dp::CLOCK_GROUP;
 use crate::dp::handler::SlaveParams;
 use crate::dp::iso::Rearm;
-use crate::dp::master::{Master, Settings};
+use crate::dp::master::{Master, Pace, Settings};
 use crate::observation::MasterMode;
 use crate::sim::bus::Place;
 use crate::sim::crystal::Crystal;
@@ -167,6 +167,8 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         address: master.address,
         bus: scenario.bus.params,
         t_dp: master.t_dp,
+        pace: Pace::Synch,
+        shared: false,
         rearm: if master.accumulate { Rearm::LastSent } else { Rearm::Grid },
         dx_retries: master.dx_retries,
         lost_after: master.lost_after.min(u16::MAX.into()) as u16,
