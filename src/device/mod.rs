@@ -45,6 +45,7 @@ pub mod drive;
 pub mod encoder;
 pub mod isochronous;
 pub mod leds;
+pub mod links;
 pub mod node;
 pub mod options;
 pub mod parameter_client;

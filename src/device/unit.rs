@@ -61,6 +61,10 @@ pub trait Function {
     fn publishers(&self) -> u128 {
         0
     }
+    /// Data exchange begins.
+    fn enter(&mut self, _now: Local, _out: &mut Outbox) {}
+    /// [`Timer::Links`] came due.
+    fn monitor(&mut self, _now: Local, _out: &mut Outbox) {}
     /// Data exchange is over.
     fn leave(&mut self, _out: &mut Outbox) {}
     /// Writes the device's own part of the diagnosis.
@@ -162,6 +166,10 @@ impl<F: Function> Unit<F> {
     /// The DP slave.
     pub const fn slave(&self) -> &Slave {
         &self.slave
+    }
+    /// What makes it this kind of unit.
+    pub const fn function(&self) -> &F {
+        &self.body.function
     }
     /// Start-up phase now.
     pub fn phase(&self) -> Phase {
@@ -391,8 +399,9 @@ impl<F: Function> Application for Body<F> {
         self.sensor = Sensor::new(SensorOptions { preset_enabled, ..self.settings.options.sensor });
         self.function.parameterise(prm, watchdog);
     }
-    fn enter(&mut self, _now: Local, out: &mut Outbox) {
+    fn enter(&mut self, now: Local, out: &mut Outbox) {
         out.sample_with_telegrams(true);
+        self.function.enter(now, out);
     }
     fn leave(&mut self, _now: Local, out: &mut Outbox) {
         self.reset(out);
@@ -475,6 +484,7 @@ impl<F: Function> Station for Unit<F> {
             Input::Deadline { timer: Timer::Connection, .. } => self.slave.connection_due(now, &mut self.body, out),
             Input::Deadline { timer: Timer::Window, .. } => self.body.window_closed(now, out),
             Input::Deadline { timer: Timer::SetPoint, .. } => self.body.set_point(now, out),
+            Input::Deadline { timer: Timer::Links, .. } => self.body.function.monitor(now, out),
             Input::Sample(raw) if self.slave.state() == SlaveState::DataExch => self.body.latch(raw, true, out),
             Input::Deadline { .. } | Input::Sent | Input::Sample(_) => {}
             Input::Command(never) => match never {},

@@ -150,14 +150,24 @@ pub enum Timer {
     SetPoint,
     /// The LEDs may change because nothing was heard.
     Leds,
+    /// A slave-to-slave link may be lost (Model: D27).
+    Links,
     /// The supervision of an MS2 connection strikes; the earliest of all.
     Connection,
 }
 
 impl Timer {
     /// Every timer, in the order of their numbers.
-    pub const ALL: [Self; 7] =
-        [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint, Self::Leds, Self::Connection];
+    pub const ALL: [Self; 8] = [
+        Self::Slot,
+        Self::Schedule,
+        Self::Watchdog,
+        Self::Window,
+        Self::SetPoint,
+        Self::Leds,
+        Self::Links,
+        Self::Connection,
+    ];
 }
 
 /// A station's answer to one input. Reused from step to step, so that no step allocates.

@@ -14,19 +14,21 @@ use crate::dp::iso::Rearm;
 use crate::dp::master::{Master, Pace, Settings};
 use crate::dp::ms2::{self, client};
 use crate::observation::MasterMode;
-use crate::sim::bus::Place;
 use crate::sim::crystal::Crystal;
 use crate::sim::motion::{self, Shaft};
-use crate::sim::network::{self, Act, Network, NetworkEvent, Site};
-use crate::sim::noise::{JitterSource, Purpose, Stream};
+use crate::sim::network::{self, Act, Network, NetworkEvent, Site, Wiring};
+use crate::sim::noise::{JitterSource, LinkJitter, Purpose, Stream};
 use crate::sim::queue::Queue;
+use crate::sim::topology::Place;
 use crate::study::plan::Plan;
 use crate::study::scenario::{self, Action, CodeSequence, Scenario, Slave, When};
 use crate::time::{Local, Span, Time};
 use crate::wire::Address;
 use crate::wire::drive::G1Stw;
 use crate::wire::parameter::ParameterAddress;
-use crate::wire::prm::{DpV1Status, DxbLink, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81};
+use crate::wire::prm::{
+    DpV1Status, DxbLink, DxbSubscription, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81,
+};
 
 /// A station's clock shows anything up to this when the run begins: clocks need not agree.
 const CLOCK_START: Span = Span::from_s(1);
@@ -62,8 +64,9 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
     let builder = PrmBuilder::new(&prm).and_then(|builder| {
         let builder = if slave.device.subscriber { Some(builder) } else { builder.user_81(&user_block(slave)) }?;
         let builder = builder.iso_m(&iso_block(scenario, slave))?;
-        let links = links_to(scenario, slave.address);
-        if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }
+        let (links, subscriptions) = tables_of(scenario, slave.address);
+        let builder = if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }?;
+        if subscriptions.is_empty() { Some(builder) } else { builder.dxb_subscriptions(&subscriptions) }
     });
     builder.expect("a checked scenario fits into Set_Prm").octets().to_vec()
 }
@@ -104,17 +107,21 @@ fn iso_block(scenario: &Scenario, slave: &Slave) -> IsoM {
     }
 }
 
-fn links_to(scenario: &Scenario, subscriber: Address) -> Vec<DxbLink> {
-    let links = scenario.links.iter().filter(|link| link.subscriber == subscriber);
-    let inputs = |publisher| scenario.slave(publisher).map_or(0, |slave| slave.device.inputs);
-    links
-        .map(|link| DxbLink {
-            publisher: link.publisher.get(),
-            length: inputs(link.publisher),
-            offset: link.offset,
-            sample: link.length,
-        })
-        .collect()
+/// The entries that `subscriber` gets: those of the link table and those of the subscriber table.
+fn tables_of(scenario: &Scenario, subscriber: Address) -> (Vec<DxbLink>, Vec<DxbSubscription>) {
+    let (mut links, mut subscriptions) = (Vec::new(), Vec::new());
+    for link in scenario.links.iter().filter(|link| link.subscriber == subscriber) {
+        let inputs = scenario.slave(link.publisher).map_or(0, |slave| slave.device.inputs);
+        let (publisher, length) = (link.publisher.get(), link.publisher_length.unwrap_or(inputs));
+        for sample in &link.samples {
+            let entry = DxbLink { publisher, length, offset: sample.offset, sample: sample.length };
+            match link.slot() {
+                None => links.push(entry),
+                Some(slot) => subscriptions.push(DxbSubscription { link: entry, slot, destination: sample.to }),
+            }
+        }
+    }
+    (links, subscriptions)
 }
 
 /// What the master knows of a slave beforehand.
@@ -142,7 +149,7 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     let master = scenario.master;
     let mut sites = vec![Site {
         machine: Node::Master(master_of(scenario)),
-        place: Place::at(master.position_mm),
+        place: place(scenario, master.address),
         crystal: crystal(seed, master.address, master.crystal),
         shaft: None,
         powered_at: Time::ZERO,
@@ -150,7 +157,8 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
-    let mut network = Network::new(scenario.bus.params.rate, sites, jitter, scenario.disturbances.clone());
+    let mut network =
+        Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, scenario.disturbances.clone());
     for event in &scenario.events {
         let when = match event.when {
             When::Time(span) => network::When::Time(Time::ZERO + span),
@@ -161,6 +169,19 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
         }
     }
     network
+}
+
+/// The cables; every repeater with jitter has its own draws, by its name.
+fn wiring(scenario: &Scenario) -> Wiring {
+    let repeaters = scenario.topology.repeaters().iter().enumerate();
+    let jitter = repeaters.filter(|(_, repeater)| repeater.jitter > Span::ZERO);
+    let jitter = jitter.map(|(i, repeater)| (i, LinkJitter::new(repeater.jitter, scenario.run.seed, &repeater.name)));
+    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect() }
+}
+
+/// Where a station is.
+fn place(scenario: &Scenario, station: Address) -> Place {
+    scenario.topology.place(scenario.point(station).expect("a station of the scenario"))
 }
 
 fn master_of(scenario: &Scenario) -> Master<Controller> {
@@ -202,7 +223,7 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let machine = if slave.silent {
         Node::Silent(slave.address)
     } else if slave.device.subscriber {
-        Node::Drive(Drive::new(&slave.device, settings, Subscriber::default()))
+        Node::Drive(Drive::new(&slave.device, settings, Subscriber::new(&slave.device, slave.address)))
     } else {
         Node::Encoder(Encoder::new(&slave.device, settings, Disc::new(&slave.device, &slave.options)))
     };
@@ -211,7 +232,7 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let shaft = Shaft::new(&slave.motion).expect("a checked motion");
     Site {
         machine,
-        place: Place::at(slave.position_mm),
+        place: place(scenario, slave.address),
         crystal: crystal(scenario.run.seed, slave.address, slave.crystal),
         shaft: Some((shaft, resolution.expect("a checked resolution"))),
         powered_at: Time::ZERO + slave.powered_at,
@@ -244,7 +265,7 @@ fn class2_site(scenario: &Scenario, class2: &scenario::Class2) -> Site<Node> {
         class2::Settings { address: class2.address, bus, ms2, per_token: class2.per_token, slaves: slaves.clone() };
     Site {
         machine: Node::Class2(Class2::new(settings, Tool::new(slaves, jobs))),
-        place: Place::at(class2.position_mm),
+        place: place(scenario, class2.address),
         crystal: crystal(scenario.run.seed, class2.address, class2.crystal),
         shaft: None,
         powered_at: Time::ZERO + class2.powered_at,
@@ -350,5 +371,34 @@ mod tests {
         assert_eq!((publisher[3], publisher[7]), (76, 0xE0), "min T_SDR is T_ID1, Publisher_Enable is set");
         let subscriber = set_prm(&four, &four.slaves[3]);
         assert_eq!(subscriber[10 + IsoM::LEN..], octets("09 03 00 00 01 06 0C 04 04"));
+    }
+
+    #[test]
+    fn a_subscriber_gets_both_tables_with_all_samples() {
+        let more = r#"
+            table = "subscriber"
+            [[link]]
+            publisher = 7
+            subscriber = 9
+            samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]
+            [[link]]
+            publisher = 7
+            subscriber = 9
+            table = "subscriber"
+            slot = 2
+            samples = [{ offset = 8, length = 4, to = 6 }, { offset = 2, length = 2 }]
+            [[link]]
+            publisher = 8
+            subscriber = 9
+            publisher_length = 10
+        "#;
+        let text = [THREE, LINK, more].concat().replace("375 us", "500 us");
+        let four = Scenario::parse("four", "four.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let subscriber = set_prm(&four, &four.slaves[3]);
+        let expected = octets(
+            "11 03 00 00 01 07 0C 04 04 07 0C 00 02 08 0A 04 04 \
+             17 07 00 00 01 06 0C 04 01 00 04 07 0C 08 02 06 04 07 0C 02 02 0A 02",
+        );
+        assert_eq!(subscriber[10 + IsoM::LEN..], expected);
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::acyclic::AcyclicCounts;
 use super::layout::Layout;
-use crate::observation::{ClockVerdict, Leds, Observation, Phase, PllState, SlaveState};
+use crate::observation::{ClockVerdict, Leds, LinkState, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -15,6 +15,8 @@ pub struct Counts {
     pub network: NetworkCounts,
     /// Per slave, in address order.
     pub slaves: Vec<SlaveCounts>,
+    /// Per link, in the order of the layout.
+    pub links: Vec<LinkCounts>,
     /// Acyclic services, by the class of the master.
     pub acyclic: AcyclicCounts,
 }
@@ -30,6 +32,10 @@ pub struct NetworkCounts {
     pub retries: u64,
     /// Requests that stayed without answer after all retries.
     pub no_answers: u64,
+    /// Times that slaves asked for Slave_Diag during data exchange (DH).
+    pub diagnoses: u64,
+    /// Times that the master went back to Clear on its own.
+    pub auto_clears: u64,
     /// SYNCHs that could not be sent when planned.
     pub late_clocks: u64,
     /// Tokens claimed after silence, the first one of a run included.
@@ -73,10 +79,43 @@ pub struct SlaveCounts {
     pub retries: u64,
     /// Requests to this slave without answer after all retries.
     pub no_answers: u64,
+    /// Times that this slave asked for Slave_Diag during data exchange (DH).
+    pub diagnoses: u64,
     /// The first SYNCH that the clock recovery took, as true instant and number of begun cycles.
     first: Option<(Time, u64)>,
     /// When the present phase was entered.
     since: Time,
+}
+
+/// What is counted for one slave-to-slave link.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct LinkCounts {
+    /// Valid receptions.
+    pub valid: u64,
+    /// How often nothing came for the watchdog time (Model: D27).
+    pub lost: u64,
+    /// Data of another length than parameterised.
+    pub length_errors: u64,
+    /// Longest true time between two valid receptions; none before the second.
+    pub longest_gap: Option<Span>,
+    /// The last valid reception.
+    last: Option<Time>,
+}
+
+impl LinkCounts {
+    /// Counts what the subscriber observed of this link at `at`.
+    pub(super) fn observe(&mut self, at: Time, what: &Observation) {
+        match *what {
+            Observation::Subscribed { .. } => {
+                self.valid += 1;
+                let gap = self.last.replace(at).map(|last| at - last);
+                self.longest_gap = self.longest_gap.max(gap);
+            }
+            Observation::WrongLength { .. } => self.length_errors += 1,
+            Observation::Link { to: LinkState::Lost, .. } => self.lost += 1,
+            _ => {}
+        }
+    }
 }
 
 /// From the first SYNCH that a slave's clock recovery took to its lock.
@@ -92,7 +131,12 @@ impl Counts {
     /// Nothing counted yet.
     pub fn new(layout: &Layout) -> Self {
         let slaves = layout.slaves().iter().map(|slave| SlaveCounts::new(slave.address)).collect();
-        Self { network: NetworkCounts::default(), slaves, acyclic: AcyclicCounts::default() }
+        Self {
+            network: NetworkCounts::default(),
+            slaves,
+            links: vec![LinkCounts::default(); layout.links().len()],
+            acyclic: AcyclicCounts::default(),
+        }
     }
 
     /// Counts what the master observed; `index` finds a slave.
@@ -101,6 +145,13 @@ impl Counts {
         match *what {
             Observation::CycleStart { .. } => self.network.cycles += 1,
             Observation::ClockLate { .. } => self.network.late_clocks += 1,
+            Observation::AutoClear { .. } => self.network.auto_clears += 1,
+            Observation::DiagnosisDue { slave: address } => {
+                self.network.diagnoses += 1;
+                if let Some(index) = slave(address) {
+                    self.slaves[index].diagnoses += 1;
+                }
+            }
             Observation::TokenClaimed => self.network.tokens_claimed += 1,
             Observation::Retry { slave: address } => {
                 self.network.retries += 1;
@@ -155,6 +206,7 @@ impl SlaveCounts {
             phases: [Span::ZERO; Phase::ALL.len()],
             retries: 0,
             no_answers: 0,
+            diagnoses: 0,
             first: None,
             since: Time::ZERO,
         }

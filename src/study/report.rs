@@ -1,7 +1,7 @@
 //! Report: the summary of a run as text that fits a screen.
 
 use super::acyclic::AcyclicSummary;
-use super::summary::{Distribution, LedSummary, LinkSummary, SlaveSummary, Summary};
+use super::summary::{Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, Summary};
 use crate::observation::Leds;
 use crate::time::Span;
 
@@ -14,6 +14,7 @@ pub const LINKS: usize = 8;
 pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     let mut lines = Vec::new();
     network(summary, &mut lines);
+    topology(summary, &mut lines);
     slaves(summary, &mut lines);
     leds(summary, &mut lines);
     spread(summary, &mut lines);
@@ -50,12 +51,23 @@ fn network(summary: &Summary, lines: &mut Vec<String>) {
         (counts.faults, "fault"),
         (counts.retries, "retry"),
         (counts.no_answers, "missing answer"),
+        (counts.diagnoses, "DH reply"),
+        (counts.auto_clears, "AutoClear"),
         (counts.late_clocks, "late clock"),
         (counts.collisions, "collision"),
         (counts.disturbed, "disturbed telegram"),
     ];
     let text: Vec<_> = happened.iter().filter(|(count, _)| *count > 0).map(|&(n, what)| number(n, what)).collect();
     lines.push(if text.is_empty() { "nothing went wrong on the bus".to_owned() } else { text.join(", ") });
+}
+
+/// What is doubtful about the cables, and how they are joined if there is more than one.
+fn topology(summary: &Summary, lines: &mut Vec<String>) {
+    lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
+    if !summary.topology.is_empty() {
+        lines.push(String::new());
+        lines.extend(summary.topology.iter().cloned());
+    }
 }
 
 fn slaves(summary: &Summary, lines: &mut Vec<String>) {
@@ -115,7 +127,7 @@ fn leds(summary: &Summary, lines: &mut Vec<String>) {
 }
 
 /// Ascending numbers as `3..5, 9`.
-fn ranges(numbers: &[u8]) -> String {
+pub(super) fn ranges(numbers: &[u8]) -> String {
     let part = |run: &[u8]| match *run {
         [first, _, .., last] => format!("{first}..{last}"),
         [first, last] => format!("{first}, {last}"),
@@ -150,7 +162,19 @@ fn links(summary: &Summary, lines: &mut Vec<String>) {
         shown.truncate(LINKS);
         shown.sort_by_key(|link| (link.publisher, link.subscriber));
     }
-    let header = ["publish latency", "p50", "p90", "p99", "p99.9", "max", "age at use max"];
+    let header = [
+        "publish latency",
+        "p50",
+        "p90",
+        "p99",
+        "p99.9",
+        "max",
+        "age at use max",
+        "valid",
+        "lost",
+        "wrong length",
+        "longest gap",
+    ];
     let rows: Vec<_> = shown.iter().map(|link| link_cells(link)).collect();
     lines.push(String::new());
     lines.extend(aligned(&header, &[], &rows));
@@ -161,6 +185,8 @@ fn links(summary: &Summary, lines: &mut Vec<String>) {
 
 fn link_cells(link: &LinkSummary) -> Vec<String> {
     let publish = |value: fn(&Distribution) -> Option<Span>| span(link.distribution("publish").and_then(value));
+    let count =
+        |of: fn(&Receptions) -> u64| link.receptions.as_ref().map_or_else(|| "-".to_owned(), |all| of(all).to_string());
     vec![
         format!("{} -> {}", link.publisher, link.subscriber),
         publish(|latency| latency.p50),
@@ -169,6 +195,10 @@ fn link_cells(link: &LinkSummary) -> Vec<String> {
         publish(|latency| latency.p99_9),
         publish(|latency| latency.max),
         span(link.distribution("age").and_then(|age| age.max)),
+        count(|receptions| receptions.valid),
+        count(|receptions| receptions.lost),
+        count(|receptions| receptions.length_errors),
+        span(link.receptions.and_then(|receptions| receptions.longest_gap)),
     ]
 }
 
@@ -265,8 +295,8 @@ LEDs red dark, green dark at slave 3: no supply
 
 latch skew: p50 90 ns, p90 90 ns, p99 90 ns, p99.9 90 ns, max 90 ns, 0.250 steps
 
-publish latency     p50     p90     p99   p99.9     max  age at use max
-         3 -> 5  400 us  400 us  400 us  400 us  400 us          750 us
+publish latency     p50     p90     p99   p99.9     max  age at use max  valid  lost  wrong length  longest gap
+         3 -> 5  400 us  400 us  400 us  400 us  400 us          750 us      0     0             0            -
 
 fingerprint: wire 0123456789abcdef
 2 files in out/sample

@@ -3,7 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use super::acyclic::AcyclicSummary;
-use super::count::{Counts, SlaveCounts};
+use super::count::{Counts, LinkCounts, SlaveCounts};
 use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
@@ -16,6 +16,12 @@ use crate::wire::Address;
 pub struct Summary {
     /// The network and the run.
     pub network: Network,
+    /// Segments, links and stations as a drawing in text; empty for a network of one cable.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub topology: Vec<String>,
+    /// What a network like this should not have, but may.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// The bus cycle.
     pub timing: Timing,
     /// What happened how often.
@@ -125,6 +131,12 @@ pub struct Happened {
     pub retries: u64,
     /// Requests without answer after all retries.
     pub no_answers: u64,
+    /// Times that slaves asked for Slave_Diag during data exchange; not written where it did not happen.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub diagnoses: u64,
+    /// Times that the master went back to Clear on its own; not written where it did not happen.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub auto_clears: u64,
     /// SYNCHs that could not be sent when planned.
     pub late_clocks: u64,
     /// Tokens claimed after silence, the first one included.
@@ -179,6 +191,9 @@ pub struct SlaveSummary {
     pub retries: u64,
     /// Requests without answer after all retries.
     pub no_answers: u64,
+    /// Times that it asked for Slave_Diag during data exchange; not written where it did not happen.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub diagnoses: u64,
     /// True time in each start-up phase.
     #[serde(rename = "phases_ms", serialize_with = "phases")]
     pub phases: Vec<(&'static str, Span)>,
@@ -212,9 +227,32 @@ pub struct LinkSummary {
     pub publisher: u8,
     /// Who takes them.
     pub subscriber: u8,
+    /// How often it worked and how often not; none before [`Summary::show_receptions`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub receptions: Option<Receptions>,
     /// Distributions of the link's quantities, by name.
     #[serde(serialize_with = "map")]
     pub distributions: Vec<(&'static str, Distribution)>,
+}
+
+/// What a subscriber got from one publisher.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct Receptions {
+    /// Valid receptions.
+    pub valid: u64,
+    /// How often nothing came for the watchdog time.
+    pub lost: u64,
+    /// Data of another length than parameterised.
+    pub length_errors: u64,
+    /// Longest true time between two valid receptions.
+    #[serde(rename = "longest_gap_ms", serialize_with = "ms_or_null")]
+    pub longest_gap: Option<Span>,
+}
+
+impl From<&LinkCounts> for Receptions {
+    fn from(&LinkCounts { valid, lost, length_errors, longest_gap, .. }: &LinkCounts) -> Self {
+        Self { valid, lost, length_errors, longest_gap }
+    }
 }
 
 /// A distribution in a few numbers. Percentiles have three significant digits, the rest is exact.
@@ -284,6 +322,7 @@ impl Summary {
         let link = |&(publisher, subscriber): &(Address, Address)| LinkSummary {
             publisher: publisher.get(),
             subscriber: subscriber.get(),
+            receptions: None,
             distributions: distributions(histograms, Subject::Link(publisher, subscriber)),
         };
         Self {
@@ -304,6 +343,8 @@ impl Summary {
                 duration: counts.network.duration,
             },
             fingerprint: facts.fingerprint,
+            topology: Vec::new(),
+            warnings: Vec::new(),
             thinning: Vec::new(),
             events_left_out: 0,
             files: Vec::new(),
@@ -318,6 +359,13 @@ impl Summary {
         }
     }
 
+    /// Adds what the subscribers received. What becomes of links is in the fingerprint of the states, and the latencies of
+    /// every reception are in that of the statistics, which therefore stays that of the latencies alone.
+    pub fn show_receptions(&mut self, counts: &Counts) {
+        for (link, counts) in self.links.iter_mut().zip(&counts.links) {
+            link.receptions = Some(counts.into());
+        }
+    }
     /// Adds the acyclic services. All of them are on the line, whose hash is another fingerprint; the hash of all figures
     /// stays comparable with that of runs before they were counted.
     pub fn show_acyclic(&mut self, counts: &Counts) {
@@ -380,6 +428,8 @@ fn happened(counts: &Counts) -> Happened {
         faults: counts.slaves.iter().map(SlaveCounts::fault_count).sum(),
         retries: network.retries,
         no_answers: network.no_answers,
+        diagnoses: network.diagnoses,
+        auto_clears: network.auto_clears,
         late_clocks: network.late_clocks,
         tokens_claimed: network.tokens_claimed,
         collisions: network.collisions,
@@ -409,11 +459,16 @@ fn slave(index: usize, facts: &Facts, counts: &Counts, histograms: &Histograms) 
         acknowledgements: counts.acknowledgements,
         retries: counts.retries,
         no_answers: counts.no_answers,
+        diagnoses: counts.diagnoses,
         phases: phases.map(|(phase, span)| (phase.text(), span)).collect(),
         distributions: distributions(histograms, Subject::Slave(counts.address)),
     }
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+const fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
 fn map<S: Serializer, K: Serialize, V: Serialize>(entries: &[(K, V)], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(entries.iter().map(|(key, value)| (key, value)))
 }

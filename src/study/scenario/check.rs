@@ -6,8 +6,9 @@ use super::error::Fault;
 use super::kinds::jitter_bound;
 use super::section::Reader;
 use super::services;
+use super::topology;
 use super::tree::Place;
-use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Scenario, Slave, When};
+use super::{Action, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Sample, Scenario, Slave, When};
 use crate::device::options::Resolution;
 use crate::sim::motion;
 use crate::sim::noise::GcJitter;
@@ -28,8 +29,8 @@ pub(super) struct Facts<'a> {
 
 /// All rules in stages. A stage takes for granted that the stages before found nothing.
 const STAGES: &[&[Rule]] = &[
-    &[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length],
-    &[class2::own_addresses, class2::positions, class2::slaves],
+    &[some_slave, own_addresses, addresses_within_hsa, wiring, crystals, run_length],
+    &[class2::slaves],
     &[isochronous_rate, bus_parameters, device_max_tsdr, own_t_sdr],
     &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
     &[services::slave_interval, services::data_control_time, services::sync_and_freeze],
@@ -38,14 +39,13 @@ const STAGES: &[&[Rule]] = &[
     &[quantum],
     &[functions, code_sequence, units_per_rev, total_range, jitter_fits, cycles_fit],
     &[publishers, subscribers, samples, link_counts, link_watchdog],
+    &[sample_lengths, destinations, told_lengths],
     &[event_stations, event_instants, disturbance_stations, services::commands],
     &[start_up],
 ];
 
 /// Largest offset of a crystal. Model: twice what cheap ones have over temperature and age.
 const CRYSTAL_MAX_PPB: i64 = 200_000;
-/// Most links of a subscriber (VPC3+C manual).
-const LINKS_MAX: usize = 29;
 
 /// Checks `scenario` stage by stage until one complains.
 pub(super) fn check(scenario: &Scenario, reader: &mut Reader<'_>) -> Vec<super::error::Problem> {
@@ -87,50 +87,45 @@ fn some_slave(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn own_addresses(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let master = facts.scenario.master.address;
-    if facts.scenario.slave(master).is_some() {
-        let fault = Fault::new(format!("the master and a slave have the address {master}"))
-            .rule("every station of a bus has an address of its own (EN 50170-2)");
-        about(reader, &format!("slave.{master}.address"), &[], fault);
+    // Of slaves the table is known by the address, so that two of them are found when they are read.
+    let all: Vec<_> = facts.scenario.stations().collect();
+    for (i, station) in all.iter().enumerate() {
+        if let Some(other) = all[..i].iter().find(|other| other.address == station.address) {
+            let (a, b) = (other.what_it_is(), station.what_it_is());
+            let fault = Fault::new(format!("{a} and {b} have the address {}", station.address))
+                .rule("every station of a bus has an address of its own (EN 50170-2)");
+            about(reader, &format!("{}.address", station.path()), &[], fault);
+        }
     }
 }
 
 fn addresses_within_hsa(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let hsa = facts.scenario.bus.params.hsa;
-    let master = facts.scenario.master.address;
-    let slaves = facts.scenario.slaves.iter().map(|s| (s.address, format!("slave.{}.address", s.address)));
-    for (address, key) in slaves.chain([(master, "master.address".to_owned())]) {
+    for station in facts.scenario.stations() {
+        let address = station.address;
         if address.get() > hsa {
             let fault = Fault::new(format!("the address {address} is above hsa = {hsa}"))
                 .rule("no station is above the highest station address HSA (EN 50170-2)")
                 .help(format!("hsa = {address} or more, at most 126"));
-            about(reader, &key, &[], fault);
+            about(reader, &format!("{}.address", station.path()), &[], fault);
         }
     }
 }
 
-fn positions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let cable = facts.scenario.bus.cable_mm;
-    let slaves = facts.scenario.slaves.iter().map(|s| (s.position_mm, format!("slave.{}.position", s.address)));
-    for (mm, key) in slaves.chain([(facts.scenario.master.position_mm, "master.position".to_owned())]) {
-        if mm > cable {
-            let fault = Fault::new(format!("{} is beyond the end of the cable", metres(mm)))
-                .rule(format!("a station is 0 m to {} along the cable (Model: one line)", metres(cable)))
-                .help(format!("for example under [bus]: cable = \"{}\"", metres(mm)));
-            about(reader, &key, &[], fault);
-        }
-    }
+fn wiring(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    topology::positions(facts.scenario, reader);
+    topology::loads(facts.scenario, reader);
+    topology::jitter(facts.scenario, reader);
 }
 
 fn crystals(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let slaves = facts.scenario.slaves.iter().map(|s| (s.crystal, format!("slave.{}.crystal", s.address)));
-    for (crystal, key) in slaves.chain([(facts.scenario.master.crystal, "master.crystal".to_owned())]) {
-        let (Crystal::Offset(ppb) | Crystal::Within(ppb)) = crystal;
+    for station in facts.scenario.stations() {
+        let (Crystal::Offset(ppb) | Crystal::Within(ppb)) = station.crystal;
         if ppb.abs() > CRYSTAL_MAX_PPB {
             let fault = Fault::new(format!("a crystal is not off by {} ppm", ppb as f64 / 1e3))
                 .rule("a crystal is within 200 ppm (Model: twice what cheap ones have)")
                 .help(format!("\"{} ppm\" at most", ppb.signum() * CRYSTAL_MAX_PPB / 1_000));
-            about(reader, &key, &[], fault);
+            about(reader, &format!("{}.crystal", station.path()), &[], fault);
         }
     }
 }
@@ -156,14 +151,18 @@ fn isochronous_rate(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn bus_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let bus = &facts.scenario.bus;
-    if let Err(broken) = bus.params.check(Bus::propagation(bus.cable_mm)) {
+    let topology = &facts.scenario.topology;
+    let t_td = topology.t_td_max();
+    if let Err(broken) = bus.params.check(t_td) {
         let help = if broken.min <= broken.max {
             format!("{} to {} with the other bus parameters and the cable", broken.min, broken.max)
         } else {
             "no value fits with the other bus parameters and the cable: change those".to_owned()
         };
+        // A line's delay is its cable's; that of segments is not to be seen in the file.
+        let path = if topology.has_segments() { format!(", T_TD = {t_td} on the longest path") } else { String::new() };
         let fault = Fault::new(format!("{} is not allowed here", broken.value))
-            .rule(format!("{} (EN 50170-2)", broken.rule))
+            .rule(format!("{} (EN 50170-2){path}", broken.rule))
             .help(help);
         about(reader, &format!("bus.{}", broken.name), &["bus.cable", "bus.rate"], fault);
     }
@@ -553,10 +552,10 @@ fn subscribers(facts: &Facts<'_>, reader: &mut Reader<'_>) {
             Some(slave) if !slave.device.subscriber => Fault::new(format!("slave {} cannot subscribe", slave.address))
                 .rule(format!("{} has no subscriber function (its profile, manual 3.4)", slave.device.name))
                 .help("subscriber-drive can"),
-            Some(_) if earlier.iter().any(|e| (e.publisher, e.subscriber) == (link.publisher, link.subscriber)) => {
+            Some(_) if earlier.iter().any(|e| is_pair(e, link) && e.table == link.table) => {
                 Fault::new(format!("slave {} has this publisher already", link.subscriber))
-                    .rule("one link per publisher and subscriber (Model: D26 counts latencies by this pair)")
-                    .help("one link whose sample holds both")
+                    .rule("one link per publisher, subscriber and table (Model: D26 counts latencies by the pair)")
+                    .help("one link with both: samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]")
             }
             Some(_) => continue,
         };
@@ -577,31 +576,126 @@ fn no_slave(facts: &Facts<'_>, address: Address) -> Fault {
     Fault::new(message).help(format!("the slaves are {}", all.join(", ")))
 }
 
-fn samples(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+/// Whether two links are of the same publisher and subscriber.
+fn is_pair(one: &Link, other: &Link) -> bool {
+    (one.publisher, one.subscriber) == (other.publisher, other.subscriber)
+}
+
+/// Every sample with the path of its keys.
+fn all_samples<'a>(facts: &Facts<'a>, reader: &Reader<'_>) -> Vec<(String, &'a Link, Sample)> {
+    let mut all = Vec::new();
     for (path, link) in links(facts) {
-        let Some(publisher) = facts.scenario.slave(link.publisher) else { continue };
-        let (offset, length, inputs) = (u32::from(link.offset), u32::from(link.length), publisher.device.inputs);
+        let listed = reader.place(&[&format!("{path}.samples")]) != Place::Missing;
+        for (i, &sample) in link.samples.iter().enumerate() {
+            all.push((if listed { format!("{path}.samples.{}", i + 1) } else { path.clone() }, link, sample));
+        }
+    }
+    all
+}
+
+/// Length of the publisher's data as Set_Prm says it, and who says so.
+fn told_length<'a>(facts: &Facts<'a>, link: &Link) -> Option<(u8, &'a str)> {
+    let publisher = facts.scenario.slave(link.publisher)?;
+    Some(
+        link.publisher_length
+            .map_or((publisher.device.inputs, &*publisher.device.name), |told| (told, "publisher_length")),
+    )
+}
+
+fn samples(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (path, link, sample) in all_samples(facts, reader) {
+        let Some((inputs, whose)) = told_length(facts, link) else { continue };
+        let (offset, length) = (u32::from(sample.offset), u32::from(sample.length));
         if length == 0 || offset + length > u32::from(inputs) {
             let fault = Fault::new(format!(
                 "a sample of {length} octets from octet {offset} on is not in the publisher's data"
             ))
             .rule(format!(
-                "length >= 1 and offset {offset} + length {length} <= {inputs} octets of {} (DXB link table)",
-                publisher.device.name
+                "length >= 1 and offset {offset} + length {length} <= {inputs} octets of {whose} (DXB link table)"
             ))
             .help("offset = 4, length = 4 is G1_XIST1 of telegram 81");
-            about(reader, &format!("{path}.length"), &[&format!("{path}.offset"), &format!("{path}.publisher")], fault);
+            let publisher = format!("link.{}.publisher", number_of(&path));
+            about(reader, &format!("{path}.length"), &[&format!("{path}.offset"), &publisher], fault);
+        }
+    }
+}
+
+/// The number of the link that `path` belongs to.
+fn number_of(path: &str) -> &str {
+    path.split('.').nth(1).unwrap_or_default()
+}
+
+fn sample_lengths(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (path, link, sample) in all_samples(facts, reader) {
+        let Some(subscriber) = facts.scenario.slave(link.subscriber) else { continue };
+        let longest = subscriber.device.dxb.data;
+        if sample.length > longest {
+            let fault = Fault::new(format!("slave {} takes no sample of {} octets", link.subscriber, sample.length))
+                .rule(format!("length <= {longest} octets of {} (DXB_Max_Data_Length)", subscriber.device.name));
+            about(reader, &format!("{path}.length"), &[], fault);
+        }
+    }
+}
+
+/// Where the samples of the subscriber table go.
+fn destinations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let mut taken: Vec<(Address, u8, std::ops::Range<u16>)> = Vec::new();
+    for (path, link, sample) in all_samples(facts, reader) {
+        let (Some(slot), Some(subscriber)) = (link.slot(), facts.scenario.slave(link.subscriber)) else { continue };
+        let (limits, name) = (subscriber.device.dxb, &subscriber.device.name);
+        let to = u16::from(sample.to)..u16::from(sample.to) + u16::from(sample.length);
+        if slot > limits.slots {
+            let fault = Fault::new(format!("slave {} has no slot {slot} for samples", link.subscriber))
+                .rule(format!("slot 1 to {} of {name} (its profile)", limits.slots));
+            about(reader, &format!("link.{}.slot", number_of(&path)), &[], fault);
+        } else if to.end > limits.data.into() {
+            let fault = Fault::new(format!(
+                "{} octets from octet {} on are not in the slot's data area",
+                sample.length, to.start
+            ))
+            .rule(format!("to + length <= {} octets of {name} (its profile)", limits.data));
+            about(reader, &format!("{path}.to"), &[&format!("{path}.length")], fault);
+        } else if let Some((.., other)) = taken.iter().find(|(station, number, other)| {
+            (*station, *number) == (link.subscriber, slot) && other.start < to.end && to.start < other.end
+        }) {
+            let fault =
+                Fault::new(format!("octets {} to {} of slot {slot} are taken already", other.start, other.end - 1))
+                    .rule(format!(
+                        "no two samples of slave {} go to the same octet (Model: its slots)",
+                        link.subscriber
+                    ))
+                    .help(format!("for example to = {}", other.end));
+            let publisher = format!("link.{}.publisher", number_of(&path));
+            about(reader, &format!("{path}.to"), &[&format!("{path}.offset"), &publisher], fault);
+        }
+        taken.push((link.subscriber, slot, to));
+    }
+}
+
+/// A publisher's data have one length, and its subscriber knows one.
+fn told_lengths(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (i, (path, link)) in links(facts).enumerate() {
+        let Some((told, _)) = told_length(facts, link) else { continue };
+        let others = facts.scenario.links[..i].iter().filter(|other| is_pair(other, link));
+        let other = others.filter_map(|other| told_length(facts, other)).find(|&(other, _)| other != told);
+        if let Some((other, _)) = other {
+            let fault = Fault::new(format!("slave {} would know two lengths of its publisher's data", link.subscriber))
+                .rule("all links of a pair say the same publisher_length (Model: a publisher has one)")
+                .help(format!("publisher_length = {other} here too"));
+            about(reader, &format!("{path}.publisher_length"), &[&format!("{path}.publisher")], fault);
         }
     }
 }
 
 fn link_counts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
-        let mut own = links(facts).filter(|(_, link)| link.subscriber == slave.address);
-        if let Some((path, _)) = own.nth(LINKS_MAX) {
-            let fault = Fault::new(format!("slave {} has more than {LINKS_MAX} links", slave.address))
-                .rule(format!("a subscriber has up to {LINKS_MAX} links (VPC3+C manual)"));
-            about(reader, &format!("{path}.subscriber"), &[], fault);
+        let most = usize::from(slave.device.dxb.links);
+        let all = all_samples(facts, reader);
+        let mut own = all.iter().filter(|(_, link, _)| link.subscriber == slave.address);
+        if let Some((path, ..)) = own.nth(most) {
+            let fault = Fault::new(format!("slave {} has more than {most} links", slave.address))
+                .rule(format!("a subscriber has up to {most} links (GSD: DXB_Max_Link_Count), each sample is one"));
+            about(reader, &format!("link.{}.subscriber", number_of(path)), &[], fault);
         }
     }
 }
@@ -711,12 +805,4 @@ fn written(span: Span) -> String {
 /// Whether octet 15 bit 1 is set, in words.
 const fn on_off(slave: &Slave) -> &'static str {
     if slave.functions { "on" } else { "off" }
-}
-
-/// A length as people write it.
-fn metres(mm: u64) -> String {
-    match mm % 1_000 {
-        0 => format!("{} m", mm / 1_000),
-        _ => format!("{mm} mm"),
-    }
 }

@@ -584,8 +584,8 @@ good.toml:34:10: link.1.length: a sample of 4 octets from octet 10 on is not in 
 good.toml:37:14: link.2.subscriber: slave 11 has this publisher already
   37 | subscriber = 11
      |              ^^
-  rule: one link per publisher and subscriber (Model: D26 counts latencies by this pair)
-  help: one link whose sample holds both
+  rule: one link per publisher, subscriber and table (Model: D26 counts latencies by the pair)
+  help: one link with both: samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]
 ",
         ),
     ]);
@@ -808,6 +808,74 @@ fn rules_without_a_place_of_their_own() {
     assert!(text.contains("event.1.cycle: the run is over before this event"), "{text}");
 }
 
+/// The good file with these lines behind its link.
+fn linked(lines: &str) -> Result<Scenario, ScenarioError> {
+    parse(&GOOD.replace("subscriber = 11", &format!("subscriber = 11\n{lines}")), &[])
+}
+
+#[test]
+fn samples_tables_and_places_of_links() {
+    let samples = "samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]";
+    let found = linked(samples).unwrap_or_else(|error| panic!("{error}")).links[0].clone();
+    let sample = |offset, length, to| Sample { offset, length, to };
+    assert_eq!((found.table, found.samples), (Table::Link, vec![sample(4, 4, 0), sample(0, 2, 0)]));
+    let lines = format!("table = \"subscriber\"\nslot = 2\npublisher_length = 9\n{samples}");
+    let found = linked(&lines).unwrap_or_else(|error| panic!("{error}")).links[0].clone();
+    assert_eq!((found.slot(), found.publisher_length), (Some(2), Some(9)));
+    assert_eq!(found.samples, [sample(4, 4, 0), sample(0, 2, 4)], "one behind the other");
+    let other = "table = \"subscriber\"\nto = 7\n[[link]]\npublisher = 3\nsubscriber = 11";
+    let found = linked(other).unwrap_or_else(|error| panic!("{error}")).links;
+    assert_eq!(
+        (found[0].slot(), found[0].samples[0].to, found[1].table),
+        (Some(1), 7, Table::Link),
+        "one in each table"
+    );
+}
+
+#[test]
+fn samples_tables_and_places_that_cannot_be() {
+    let subscriber = "table = \"subscriber\"";
+    let cases = [
+        ("samples = []", "link.1.samples: a link has a sample at least"),
+        ("samples = 4", "link.1.samples: this is a number"),
+        ("samples = [4]", "link.1.samples: a sample is a table"),
+        ("samples = [{ offset = 4 }]", "link.1.samples.1.length: this key is missing"),
+        ("samples = [{ offset = 4, length = 4, at = 1 }]", "link.1.samples.1.at: there is no such key"),
+        ("offset = 4\nsamples = [{ offset = 4, length = 4 }]", "link.1: a link has either samples or offset"),
+        (
+            "samples = [{ offset = 0, length = 4 }, { offset = 10, length = 4 }]",
+            "link.1.samples.2.length: a sample of 4",
+        ),
+        ("length = 0", "link.1.length: a sample of 0 octets"),
+        ("publisher_length = 7", "offset 4 + length 4 <= 7 octets of publisher_length"),
+        ("publisher_length = 0", "link.1.publisher_length: 0 is out of range"),
+        ("publisher_length = 245", "link.1.publisher_length: 245 is out of range"),
+        ("table = \"links\"", "link.1.table: there is no table \"links\""),
+        ("slot = 1", "link.1: the link table has no slot"),
+        ("to = 1", "link.1: the link table has no to"),
+        ("samples = [{ offset = 4, length = 4, to = 1 }]", "the link table has no to"),
+        ("table = \"subscriber\"\nslot = 3", "link.1.slot: slave 11 has no slot 3 for samples"),
+        ("table = \"subscriber\"\nslot = 0", "link.1.slot: 0 is out of range"),
+        ("table = \"subscriber\"\nto = 241", "link.1.to: 4 octets from octet 241 on are not in the slot's data area"),
+        (
+            "table = \"subscriber\"\nsamples = [{ offset = 4, length = 4 }, { offset = 4, length = 4, to = 3 }]",
+            "link.1.samples.2.to: octets 0 to 3 of slot 1 are taken already",
+        ),
+        (
+            "publisher_length = 11\n[[link]]\npublisher = 3\nsubscriber = 11\ntable = \"subscriber\"",
+            "link.2.publisher_length: slave 11 would know two lengths of its publisher's data",
+        ),
+    ];
+    for (lines, expected) in cases {
+        let said = linked(lines).map(|scenario| scenario.links).unwrap_err().to_string();
+        assert!(said.contains(expected), "{lines}\n{said}");
+    }
+    let second = format!("{subscriber}\n[[link]]\npublisher = 4\nsubscriber = 11\n{subscriber}");
+    let said = linked(&second).map(|scenario| scenario.links).unwrap_err().to_string();
+    assert!(said.contains("link.2.to: octets 0 to 3 of slot 1 are taken already"), "{said}");
+    assert!(said.contains("for example to = 4"), "{said}");
+}
+
 #[test]
 fn a_subscriber_has_at_most_29_links() {
     let link = |i| format!("[[link]]\npublisher = {}\nsubscriber = 100\n", i + 3);
@@ -835,7 +903,7 @@ fn a_good_file_becomes_a_scenario() {
     assert_eq!(scenario.slaves[0].crystal, Crystal::Within(50_000));
     assert_eq!(scenario.slaves[0].motion, Motion::Speed { start: Angle::ZERO, micro_rpm: 1_500_000_000 });
     let (publisher, subscriber) = (address(3), address(11));
-    assert_eq!(scenario.links, [Link { publisher, subscriber, offset: 4, length: 4 }]);
+    assert_eq!(scenario.links, [Link::of(publisher, subscriber, 4, 4)]);
     let action = Action::HoldLifeSign { cycles: Some(2) };
     assert_eq!(scenario.events, [Event { when: When::Time(Span::from_s(1)), slaves: vec![publisher], action }]);
     let bursts = Bursts { from_cycle: 1_000, count: 1, every: Some(100) };
@@ -1048,7 +1116,99 @@ fn disturbed() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
+/// Two segments, each kind of link in turn between them, and a slave on each.
+const SEGMENTS: &str = r#"
+[run]
+cycles = 9
+[bus]
+rate = "12 Mbit/s"
+[[segment]]
+name = "a"
+cable = "100 m"
+[[segment]]
+name = "b"
+cable = "50 m"
+delay_per_metre = "6 ns"
+[[repeater]]
+kind = "olm"
+from = "a"
+to = "b"
+fibre = "10 m"
+modules = 3
+delay = "5 tbit"
+jitter = "20 ns"
+[master]
+address = 2
+segment = "a"
+t_dp = "4 ms"
+t_i = "125 us"
+t_o = "2 ms"
+[[slave]]
+address = 3
+segment = "a"
+device = "posital-ocd-dpb1b"
+[[slave]]
+addresses = "4..5"
+segment = "b"
+device = "posital-ocd-dpb1b"
+"#;
+
+#[test]
+fn segments_and_repeaters_are_read_and_overridden() {
+    let scenario = parse(SEGMENTS, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let [a, b] = scenario.topology.segments() else { panic!("two segments") };
+    assert_eq!((a.name.as_str(), a.cable_mm, a.delay_per_metre), ("a", 100_000, Span::from_ns(5)));
+    assert_eq!((b.name.as_str(), b.cable_mm, b.delay_per_metre), ("b", 50_000, Span::from_ns(6)));
+    let [link] = scenario.topology.repeaters() else { panic!("one link") };
+    assert_eq!((link.name.as_str(), link.kind.name, link.modules, link.fibre_mm), ("a - b", "olm", 3, 10_000));
+    assert_eq!(link.ends, [Point { segment: 0, mm: 100_000 }, Point { segment: 1, mm: 0 }]);
+    // Three modules of 5 t_bit and 10 m of glass.
+    assert_eq!(link.crossing(), Span::from_ns(1_250 + 50));
+    assert_eq!(link.jitter, Span::from_ns(20));
+    let at = |slave: &Slave| (slave.address.get(), slave.segment, slave.position_mm);
+    assert_eq!(scenario.slaves.iter().map(at).collect::<Vec<_>>(), [(3, 0, 100_000), (4, 1, 25_000), (5, 1, 50_000)]);
+
+    let sets = [
+        ("segment.2.cable", "60 m"),
+        ("repeater.1.delay", "1 us"),
+        ("slave.5.segment", "a"),
+        ("repeater.1.to_position", "7 m"),
+    ];
+    let other = parse(SEGMENTS, &sets).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(other.slaves.iter().map(at).collect::<Vec<_>>(), [(3, 0, 50_000), (4, 1, 60_000), (5, 0, 100_000)]);
+    assert_eq!(other.topology.repeaters()[0].crossing(), Span::from_ns(3_050));
+    assert_eq!(other.delay(address(2), address(4)), Span::from_ns(500 + 3_050 + 53 * 6));
+}
+
+#[test]
+fn t_td_is_the_delay_with_the_worst_jitter_and_rounded_up() {
+    let scenario = parse(SEGMENTS, &[("slave.5.position", "33333 mm"), ("repeater.1.to_position", "1 mm")]);
+    let scenario = scenario.unwrap_or_else(|error| panic!("{error}"));
+    let (master, slave) = (address(2), address(5));
+    assert_eq!(scenario.t_td(master, slave), scenario.t_td(slave, master));
+    let more = scenario.t_td(master, slave) - scenario.delay(master, slave) - Span::from_ns(20);
+    assert!((Span::ZERO..=Span::from_ticks(2)).contains(&more), "{more}");
+    assert!(scenario.topology.t_td_max() >= scenario.t_td(master, slave));
+    assert_eq!(scenario.t_td(master, address(77)), Span::ZERO, "there is no such station");
+}
+
 proptest! {
+    #[test]
+    fn numbers_of_any_size_in_segments_do_not_panic(
+        place in prop::sample::select(vec![
+            "segment.1.cable", "segment.2.delay_per_metre", "segment.2.name", "repeater.1.from", "repeater.1.to",
+            "repeater.1.from_position", "repeater.1.to_position", "repeater.1.delay", "repeater.1.jitter",
+            "repeater.1.modules", "repeater.1.fibre", "repeater.1.kind", "master.segment", "slave.4.segment",
+            "slave.4.position", "bus.cable",
+        ]),
+        number in prop_oneof![any::<i64>(), -1000i64..100_000],
+        unit in prop::sample::select(vec!["", " tick", " us", " s", " tbit", " m", " km", " mm"]),
+    ) {
+        match parse(SEGMENTS, &[(place, &format!("{number}{unit}"))]) {
+            Err(error) => prop_assert!(!error.problems.is_empty()),
+            Ok(scenario) => prop_assert!(scenario.topology.t_td_max() >= Span::ZERO),
+        }
+    }
     #[test]
     fn no_octets_panic(octets in prop_oneof![prop::collection::vec(any::<u8>(), 0..400), disturbed()]) {
         if let Ok(text) = decode(&octets)
@@ -1059,7 +1219,7 @@ proptest! {
     }
     #[test]
     fn no_override_panics(
-        key in "(master|slave|run|bus|link|event|x)(\\.(3|1|0|t_o|rate|cable|motion|)){0,3}",
+        key in "(master|slave|run|bus|link|event|segment|repeater|x)(\\.(3|1|0|t_o|rate|cable|motion|)){0,3}",
         value in ".{0,30}",
     ) {
         if let Err(error) = parse(GOOD, &[(&key, &value)]) {
