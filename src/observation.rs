@@ -367,6 +367,11 @@ pub enum Observation {
         /// How late its sending begins.
         by: Span,
     },
+    /// The token came back so late that whole cycles are left out.
+    SynchMissed {
+        /// How many SYNCH never left.
+        cycles: u64,
+    },
     /// The master's operation mode changed.
     MasterMode {
         /// Before.
@@ -820,13 +825,14 @@ impl Observation {
 
 /// One line in the field's words.
 impl fmt::Display for Observation {
-    #[allow(clippy::too_many_lines)] // A line or two for each observation.
+    #[allow(clippy::too_many_lines, reason = "a line for each observation")]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::CycleStart { cycle, .. } => write!(f, "cycle {cycle} starts"),
             Self::ExchangeDone { t_dx, retries } => write!(f, "T_DX {t_dx}, {retries} retries"),
             Self::CycleSpare { acyclic, spare } => write!(f, "acyclic part and token {acyclic}, spare {spare}"),
             Self::ClockLate { by } => write!(f, "SYNCH {by} late, the bus was in use"),
+            Self::SynchMissed { cycles } => write!(f, "{cycles} SYNCH missed, the token was away"),
             Self::MasterMode { from, to } => write!(f, "master {from} -> {to}"),
             Self::Handler { slave, from, to } => write!(f, "slave {slave}: {from} -> {to}"),
             Self::Retry { slave } => write!(f, "slave {slave}: request repeated"),

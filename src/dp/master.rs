@@ -19,8 +19,15 @@
 //! | Exchange | answer or none after the repeats | Exchange with the next slave; after the last Control, Startup or Acyclic |
 //! | Control | end of the Global_Control | another Control, Startup or Acyclic |
 //! | Startup, Acyclic | answer or none | Gap |
-//! | Gap | answer or none | Spare, the token sent; Token where the spare time is active |
+//! | Gap | answer or none | alone: Spare, the token sent; Token where the spare time is active; in a ring: Away |
 //! | Token | `Schedule` due | Token, another token sent, while one fits; then Spare |
+//! | Away | token held | Alive, or Spare where SYNCH is near; free-running: Clock, or Exchange where it stopped |
+//! | Spare | others could claim the token before SYNCH | Silence |
+//! | Silence | `Schedule` due | Alive: an FDL status request on its way |
+//! | Alive | answer or none | Spare |
+//! | any with the token | token gone | Away |
+//!
+//! A free-running master has no SYNCH: its Clock ends with the first bit of a poll cycle, see `master/cycle.rs`.
 //!
 //! Where a slave's diagnosis is due, Slave_Diag takes the place of its Data_Exchange, or is the acyclic message; see
 //! [`handler`](crate::dp::handler). When the mode changes without an order says
@@ -28,7 +35,12 @@
 //!
 //! A part that has nothing to do, or whose longest course would not end before the next SYNCH, is left out.
 
+mod cycle;
+
 use alloc::vec::Vec;
+
+pub use cycle::Pace;
+use cycle::Polling;
 
 use crate::dp::handler::{Answer, Handler, Patch, SAP_FRAME_OCTETS, SlaveParams, StartupTelegram};
 use crate::dp::iso::{CycleClock, Rearm};
@@ -90,8 +102,12 @@ pub struct Settings {
     pub address: Address,
     /// Bus parameters.
     pub bus: BusParams,
-    /// T_DP.
+    /// T_DP; of a free-running master the cycle time that is planned.
     pub t_dp: Span,
+    /// Whether cycles begin with SYNCH.
+    pub pace: Pace,
+    /// Other active stations belong to this bus, in the ring or not yet: silence is never as long as their T_TO.
+    pub shared: bool,
     /// How the next cycle start is found.
     pub rearm: Rearm,
     /// Repeats of an unanswered Data_Exchange (Model: D7).
@@ -128,6 +144,12 @@ enum Part {
     Gap(Address),
     /// A further token in active spare time.
     Token,
+    /// The token is elsewhere.
+    Away,
+    /// The token is held in silence, a poll is scheduled.
+    Silence,
+    /// A poll of this address, to be heard.
+    Alive(Address),
 }
 
 /// A class 1 master.
@@ -157,6 +179,9 @@ pub struct Master<A> {
     /// Where the search for the next slave in start-up begins.
     startup_next: usize,
     ms1: Client,
+    /// Number of the first cycle since power on.
+    begun: u64,
+    polling: Polling,
 }
 
 impl<A: Application> Master<A> {
@@ -183,6 +208,8 @@ impl<A: Application> Master<A> {
             supervision: Supervision::new(settings.auto_clear, settings.data_control_time, settings.clear_for),
             startup_next: 0,
             ms1: Client::new(settings.ms1_timeout),
+            begun: 0,
+            polling: Polling::new(),
             settings,
         }
     }
@@ -228,7 +255,8 @@ impl<A: Application> Master<A> {
     fn confirmed(&mut self, now: Local, confirm: Confirm<'_>, out: &mut Outbox) {
         match (self.part, confirm) {
             (_, Confirm::Nothing) => {}
-            (Part::Starting, Confirm::TokenHeld) => self.begin(now, out),
+            (_, Confirm::TokenHeld) => self.token_held(now, out),
+            (_, Confirm::TokenGone) => self.token_gone(out),
             (Part::Exchange(slave), confirm) => {
                 self.exchange_answered(now, slave, confirm, out);
                 self.exchange(now, slave + 1, out);
@@ -245,27 +273,20 @@ impl<A: Application> Master<A> {
                 out.observe(Observation::Gap { address, answer });
                 self.token(out);
             }
+            (Part::Alive(address), Confirm::Gap(answer)) => {
+                out.observe(Observation::Gap { address, answer });
+                self.spare(now, out);
+            }
             (part, confirm) => unreachable!("{confirm:?} during {part:?}: the active station answers requests only"),
         }
-    }
-
-    /// The token is held: the slaves are started up in Clear, the clock starts one T_DP from here.
-    fn begin(&mut self, now: Local, out: &mut Outbox) {
-        let t_gc = self.settings.bus.rate.octets(GC_OCTETS);
-        self.clock = CycleClock::new(self.settings.t_dp, t_gc, self.settings.rearm, now + self.settings.t_dp);
-        self.set_mode(MasterMode::Clear, out);
-        self.spare(now, out);
-    }
-
-    fn spare(&mut self, from: Local, out: &mut Outbox) {
-        self.part = Part::Spare;
-        out.arm(Timer::Schedule, from);
     }
 
     /// `Schedule` came due.
     fn scheduled(&mut self, now: Local, out: &mut Outbox) {
         match self.part {
-            Part::Spare => self.synch(now, out),
+            Part::Spare if self.settings.pace == Pace::Synch => self.synch(now, out),
+            Part::Spare => self.visit(now, out),
+            Part::Silence => self.be_heard(now, out),
             Part::Control => self.acyclic(now, out),
             Part::Token => self.further_token(now, out),
             _ => {}
@@ -283,16 +304,15 @@ impl<A: Application> Master<A> {
         self.part = Part::Clock;
     }
 
-    /// The last bit of SYNCH left at `now`: a cycle begins.
+    /// The last bit of SYNCH left at `now`, or the first bit of a free-running master's cycle does: it begins.
     fn clock_sent(&mut self, now: Local, out: &mut Outbox) {
-        self.active.clock_sent(now);
-        let (cycle, nominal) = self.clock.started(now);
+        let (cycle, nominal) = self.started(now);
         self.t0 = now;
         self.exchange_end = now;
         self.exchanged = false;
         self.retries = 0;
         out.observe(Observation::CycleStart { cycle, nominal });
-        let (mode, to_blame) = self.supervision.cycle(now, cycle, self.mode, &self.handlers);
+        let (mode, to_blame) = self.supervision.cycle(now, cycle - self.begun, self.mode, &self.handlers);
         if let Some(slave) = to_blame {
             out.observe(Observation::AutoClear { slave: self.handlers[slave].params().address });
         }
@@ -306,6 +326,9 @@ impl<A: Application> Master<A> {
         let Some(slave) = (from..self.handlers.len()).find(|&slave| self.handlers[slave].exchanges()) else {
             return self.exchange_done(out);
         };
+        if self.stops_before(slave, now, out) {
+            return;
+        }
         self.exchanged = true;
         self.part = Part::Exchange(slave);
         let handler = &mut self.handlers[slave];
@@ -362,11 +385,6 @@ impl<A: Application> Master<A> {
         self.acyclic(self.exchange_end, out);
     }
 
-    /// Whether something that keeps the bus busy for `span` ends early enough for the next SYNCH.
-    fn fits(&self, span: Span) -> bool {
-        self.active.free_at() + span + self.active.t_id1() <= self.clock.planned()
-    }
-
     /// The acyclic part of this cycle: the mode if it is due, commands, then one message (Model: D6).
     fn acyclic(&mut self, now: Local, out: &mut Outbox) {
         let since = self.clock.coming().saturating_sub(self.control_told);
@@ -403,7 +421,7 @@ impl<A: Application> Master<A> {
         }
     }
     fn acyclic_message(&mut self, out: &mut Outbox) {
-        let Some((slave, du)) = self.ms1.next() else { return self.gap(out) };
+        let Some((slave, du)) = self.ms1.next().filter(|_| self.may_low()) else { return self.gap(out) };
         let longest = SAP_FRAME_OCTETS + self.ms1.longest_answer();
         let Some(retries) = self.retries_that_fit(SAP_FRAME_OCTETS + du.len(), longest) else {
             return self.gap(out);
@@ -511,40 +529,6 @@ impl<A: Application> Master<A> {
             self.acyclic_done((took, slave), Err(Failure::Left), out);
         }
     }
-
-    fn gap(&mut self, out: &mut Outbox) {
-        let due = self.clock.coming().is_multiple_of(self.settings.bus.gap_factor.into());
-        let fits = due && self.fits(self.active.longest_cycle(STATUS_OCTETS, STATUS_OCTETS));
-        match fits.then(|| self.active.poll_gap(self.active.free_at(), out)).flatten() {
-            Some(address) => self.part = Part::Gap(address),
-            None => self.token(out),
-        }
-    }
-    fn token(&mut self, out: &mut Outbox) {
-        let free = self.active.free_at();
-        let end = if self.fits(self.settings.bus.rate.octets(3)) { self.active.pass_token(free, out) } else { free };
-        out.observe(Observation::CycleSpare {
-            acyclic: end - self.exchange_end,
-            spare: (self.clock.planned() - end).max(Span::ZERO),
-        });
-        self.idle(end, out);
-    }
-    /// The cycle's work ends at `end`: silence, or further tokens (Model: D6).
-    fn idle(&mut self, end: Local, out: &mut Outbox) {
-        if !self.settings.active_spare {
-            return self.spare(end, out);
-        }
-        self.part = Part::Token;
-        out.arm(Timer::Schedule, end);
-    }
-    fn further_token(&mut self, now: Local, out: &mut Outbox) {
-        if self.fits(self.settings.bus.rate.octets(3)) {
-            let end = self.active.pass_token(self.active.free_at(), out);
-            self.idle(end, out);
-        } else {
-            self.spare(now, out);
-        }
-    }
 }
 
 impl<A: Application> Station for Master<A> {
@@ -564,7 +548,7 @@ impl<A: Application> Station for Master<A> {
                 self.count_retry(out);
                 self.confirmed(now, confirm, out);
             }
-            Input::Sent => self.clock_sent(now, out),
+            Input::Sent if self.part == Part::Clock => self.clock_sent(now, out),
             Input::Deadline { timer: Timer::Slot, busy } => {
                 let confirm = self.active.slot_over(now, busy, out);
                 self.count_retry(out);
@@ -576,7 +560,10 @@ impl<A: Application> Station for Master<A> {
                 self.set_mode(mode, out);
             }
             Input::Command(Order::Control(control)) if self.mode >= MasterMode::Clear => self.commands.push(control),
-            Input::Deadline { .. } | Input::Sample(_) | Input::Command(Order::Mode(_) | Order::Control(_)) => {}
+            Input::Sent
+            | Input::Deadline { .. }
+            | Input::Sample(_)
+            | Input::Command(Order::Mode(_) | Order::Control(_)) => {}
             Input::Command(Order::Patch(slave, telegram, patch)) => self.patch(slave, telegram, &patch, out),
             Input::Command(Order::Application(command)) => self.app.command(command, out),
         }

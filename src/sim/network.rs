@@ -131,7 +131,7 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     cycle_acts: Vec<(u64, usize)>,
     next_cycle_act: usize,
     now: Time,
-    /// SYNCH telegrams that the master has sent, lost ones included.
+    /// Cycles that the first station has begun, with a lost SYNCH too.
     clocks: u64,
     out: Outbox,
 }
@@ -141,7 +141,11 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
 pub struct NetworkEvent(Event);
 
 impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
-    /// A network at rest at time zero. Stations are switched on at their own instants.
+    /// The station whose cycles count.
+    const CLOCK: usize = 0;
+
+    /// A network at rest at time zero. Stations are switched on at their own instants. Cycles are those of the first
+    /// station: they end a run, orders are bound to them.
     ///
     /// # Panics
     /// If two stations have one address, or there are more than 127: the caller checks scenarios.
@@ -308,7 +312,11 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.slots[slot].site.shaft.as_ref().map_or(0, |(shaft, resolution)| resolution.raw(shaft.angle(self.now)))
     }
 
+    /// A station's cycle begins. Only those of the first station are the network's.
     fn sent<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
+        if slot != Self::CLOCK || !self.slots[slot].powered {
+            return self.step(slot, self.local(slot), Input::Sent, recorder);
+        }
         let cycle = self.clocks;
         self.clocks += 1;
         while let Some(&(_, act)) = self.cycle_acts.get(self.next_cycle_act).filter(|&&(due, _)| due <= cycle) {
@@ -366,6 +374,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 Order::Off => self.slots[slot].deadlines[which].due = None,
                 Order::At(at) => Self::arm(&mut self.queue, &mut self.slots[slot], which, at.max(now), self.now),
             }
+        }
+        if let Some(at) = self.out.beginning_cycle() {
+            let at = self.slots[slot].site.crystal.to_true(at).max(self.now);
+            self.push(at, Phase::Edge, slot, Event::Sent);
         }
         self.transmit(slot, recorder);
     }

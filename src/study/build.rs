@@ -11,7 +11,7 @@ use crate::dp::CLOCK_GROUP;
 use crate::dp::class2::{self, Class2};
 use crate::dp::handler::SlaveParams;
 use crate::dp::iso::Rearm;
-use crate::dp::master::{Master, Settings};
+use crate::dp::master::{Master, Pace, Settings};
 use crate::dp::ms2::{self, client};
 use crate::observation::MasterMode;
 use crate::sim::crystal::Crystal;
@@ -206,6 +206,8 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         address: master.address,
         bus: scenario.bus.params,
         t_dp: master.t_dp,
+        pace: Pace::Synch,
+        shared: !scenario.class2.is_empty(),
         rearm: if master.accumulate { Rearm::LastSent } else { Rearm::Grid },
         dx_retries: master.dx_retries,
         lost_after: master.lost_after.min(u16::MAX.into()) as u16,
