@@ -54,6 +54,7 @@ fn network(summary: &Summary, lines: &mut Vec<String>) {
     ];
     let text: Vec<_> = happened.iter().filter(|(count, _)| *count > 0).map(|&(n, what)| number(n, what)).collect();
     lines.push(if text.is_empty() { "nothing went wrong on the bus".to_owned() } else { text.join(", ") });
+    lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
 }
 
 fn slaves(summary: &Summary, lines: &mut Vec<String>) {
@@ -113,7 +114,7 @@ fn leds(summary: &Summary, lines: &mut Vec<String>) {
 }
 
 /// Ascending numbers as `3..5, 9`.
-fn ranges(numbers: &[u8]) -> String {
+pub(super) fn ranges(numbers: &[u8]) -> String {
     let part = |run: &[u8]| match *run {
         [first, _, .., last] => format!("{first}..{last}"),
         [first, last] => format!("{first}, {last}"),
@@ -213,7 +214,7 @@ fn range(low: Option<Span>, high: Option<Span>) -> String {
     if low == high { span(low) } else { format!("{} to {}", span(low), span(high)) }
 }
 /// `1 slave`, `2 slaves`, `3 retries`.
-fn number(count: impl TryInto<u64>, noun: &str) -> String {
+pub(super) fn number(count: impl TryInto<u64>, noun: &str) -> String {
     let count = count.try_into().unwrap_or(u64::MAX);
     match noun.strip_suffix('y') {
         _ if count == 1 => format!("1 {noun}"),
@@ -283,6 +284,13 @@ fingerprint: wire 0123456789abcdef
                 .unwrap_or_else(|| panic!("no {slave} in\n{text}"));
             assert!(line.ends_with(&format!("{} x 0F04", number + 1)), "{line}");
         }
+    }
+
+    #[test]
+    fn warnings_are_told_where_the_bus_is() {
+        let mut summary = sample::run();
+        summary.warnings = vec!["too slow".to_owned()];
+        assert!(render(&summary, None).contains("\n1 fault, 2 retries\nwarning: too slow\n\nslave"));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
+use super::plan::rules;
 use super::plot::{BusCycle, Distribution, Distributions, LinkLatencies, PlotError, PlotMeta, Plots};
 use super::row::Sink;
 use super::scenario::{Extent, Scenario};
@@ -148,7 +149,8 @@ pub fn run<Q: Queue<NetworkEvent>>(
     let (fingerprints, (metrics, bus)) = recorder;
     let (counts, sinks) = metrics.finish(network.now());
 
-    let summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
+    let mut summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
+    summary.warnings = rules::warnings(scenario);
     conclude(summary, &counts, sinks, bus.as_ref(), &fingerprints, dir)
 }
 

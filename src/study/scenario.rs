@@ -15,6 +15,7 @@ mod read;
 mod section;
 mod tree;
 
+use check::Check;
 pub use error::{Fault, Position, Problem, ScenarioError};
 
 use crate::device::options::{Resolution, UnitOptions};
@@ -70,11 +71,21 @@ impl Scenario {
     /// # Errors
     /// The file cannot be read, is no text, too long or empty, or [`Self::parse`] finds something wrong.
     pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        Self::open(path, overrides, Check::All)
+    }
+    /// As [`Self::load`], but the rules of [`plan::rules`](crate::study::plan::rules) may be broken: a network to plan.
+    ///
+    /// # Errors
+    /// As [`Self::load`] for everything else.
+    pub fn load_to_plan(path: &Path, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        Self::open(path, overrides, Check::ToPlan)
+    }
+    fn open(path: &Path, overrides: &[(String, String)], check: Check) -> Result<Self, ScenarioError> {
         let source = path.display().to_string();
         let octets = read_file(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
         let text = decode(&octets).map_err(|fault| ScenarioError::about_file(&source, fault))?;
         let name = name_of(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
-        Self::parse(&name, &source, text, overrides)
+        Self::read(&name, &source, text, overrides, check)
     }
 
     /// Reads `text` as the scenario `name`; messages call it `source`. `overrides` as for [`Self::load`].
@@ -82,6 +93,27 @@ impl Scenario {
     /// # Errors
     /// The text is no TOML, a key is unknown, missing or wrong, or a rule of the bus or of a device is broken.
     pub fn parse(name: &str, source: &str, text: &str, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        Self::read(name, source, text, overrides, Check::All)
+    }
+    /// As [`Self::parse`], but the rules of [`plan::rules`](crate::study::plan::rules) may be broken: a network to plan.
+    ///
+    /// # Errors
+    /// As [`Self::parse`] for everything else.
+    pub fn parse_to_plan(
+        name: &str,
+        source: &str,
+        text: &str,
+        overrides: &[(String, String)],
+    ) -> Result<Self, ScenarioError> {
+        Self::read(name, source, text, overrides, Check::ToPlan)
+    }
+    fn read(
+        name: &str,
+        source: &str,
+        text: &str,
+        overrides: &[(String, String)],
+        check: Check,
+    ) -> Result<Self, ScenarioError> {
         if text.trim().is_empty() {
             let fault = Fault::new("the scenario is empty").help("it needs [run], [bus], [master] and a [[slave]]");
             return Err(ScenarioError::about_file(source, fault));
@@ -92,7 +124,7 @@ impl Scenario {
         let read = read::scenario(&mut reader, root);
         let mut problems = reader.take_problems();
         if let Some(mut scenario) = read.filter(|_| problems.is_empty()) {
-            problems = check::check(&scenario, &mut reader);
+            problems = check::check(&scenario, &mut reader, check);
             if problems.is_empty() {
                 name.clone_into(&mut scenario.name);
                 scenario.question = question(text);

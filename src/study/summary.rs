@@ -35,6 +35,9 @@ pub struct Summary {
     pub events_left_out: u64,
     /// The files of the run.
     pub files: Vec<String>,
+    /// Rules that the network runs without, though it should keep them, a sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 /// What only the builder of a run knows.
@@ -302,6 +305,7 @@ impl Summary {
             thinning: Vec::new(),
             events_left_out: 0,
             files: Vec::new(),
+            warnings: Vec::new(),
         }
     }
 

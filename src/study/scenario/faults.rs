@@ -276,11 +276,11 @@ fn bus_parameters_that_break_a_rule() {
             "12 Mbit/s",
             "500 kbit/s",
             r#"
-good.toml:9:8: bus.rate: 500 kbit/s is too slow for isochronous mode
-  9 | rate = "500 kbit/s"
-    |        ^^^^^^^^^^^^
-  rule: isochronous mode is offered from 1.5 Mbit/s on (SIMODRIVE 611 universal manual)
-  help: "1.5 Mbit/s", "3 Mbit/s", "6 Mbit/s" or "12 Mbit/s"
+good.toml:14:8: master.t_dp: T_DP = 4 ms cannot hold the cycle of 4 slaves
+  14 | t_dp = "4 ms"
+     |        ^^^^^^
+  rule: T_DP >= T_DX 4.216 ms + GAP 606 us + token 140 us + Global_Control 360 us = 5.322 ms (manual 3.3.2)
+  help: the shortest is t_dp = "5.375 ms"
 "#,
         ),
         (
