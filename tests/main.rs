@@ -10,6 +10,7 @@ mod golden;
 mod layers;
 mod manual;
 mod options;
+mod plan;
 mod props;
 mod rig;
 mod scenarios;

@@ -360,7 +360,7 @@ fn rules(findings: &[Finding], lines: &mut Vec<String>) {
     ));
     for line in all.iter().filter(|line| !line.holds()) {
         let side = line.sides.iter().find(|side| !side.holds()).unwrap_or(&line.sides[0]);
-        let message = side.fault.as_ref().map_or_else(|| line.rule.text.to_owned(), |fault| fault.message.clone());
+        let message = side.fault.as_ref().map_or_else(|| line.numbers(), |fault| fault.message.clone());
         let near = match nearest(side, findings) {
             Some(near) => format!("nearest {} = {near}", side.key.name),
             None if side.follows => side.fault.as_ref().map_or_else(String::new, |fault| fault.help.clone()),

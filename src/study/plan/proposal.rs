@@ -83,8 +83,14 @@ fn mend(network: &mut Scenario) {
     for _ in 0..ROUNDS {
         let findings = Facts::of(network).findings();
         let broken = findings.iter().filter(|found| found.rule.weight == Weight::Must && !found.holds());
-        let changes: Vec<_> = broken.filter_map(|found| Some((found.key, nearest(found, &findings)?))).collect();
+        let changes: Vec<_> = broken.map(|found| (found.key, nearest(found, &findings))).collect();
         let before = network.clone();
+        if changes.iter().any(|(key, near)| key.subject == Subject::Bus && near.is_none()) {
+            // T_SET and T_QUI can be so long that nothing else has room.
+            let usual = BusParams::profile(network.bus.params.rate);
+            (network.bus.params.t_set, network.bus.params.t_qui) = (usual.t_set, usual.t_qui);
+        }
+        let changes = changes.into_iter().filter_map(|(key, near)| Some((key, near?)));
         for (key, amount) in changes {
             set(network, key, amount);
         }

@@ -69,6 +69,11 @@ impl View<'_> {
     fn quiet(&self) -> f64 {
         self.cycle.bars.iter().map(|bar| self.us(bar.end)).fold(0.0, f64::max)
     }
+    /// End of the axis: a planned cycle, or its T_O, can be longer than T_DP. What is far away stays at the edge.
+    fn end(&self) -> f64 {
+        let cycle = self.quiet().max(self.next.1);
+        self.t_o().map_or(cycle, |t_o| cycle.max(t_o.0.min(2.0 * cycle)))
+    }
     /// Latest T_O, whether another slave's differs by more than 1 µs, and its slave.
     fn t_o(&self) -> Option<(f64, bool, Address)> {
         extreme(self.slaves.iter().filter_map(|&slave| Some((self.us(self.cycle.t_o(slave)?), slave))), 1.0)
@@ -133,7 +138,7 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
 
 /// Draws one cycle.
 pub(super) fn draw_view(meta: &PlotMeta, words: &Words<'_>, view: &View<'_>) -> Result<String, String> {
-    let (cycle, next) = (view.cycle, view.next);
+    let cycle = view.cycle;
     let keys = keys(view);
     let slaves = meta.slaves.len();
     let above = DIMENSIONS as i32 * DIMENSION + NAMES;
@@ -145,8 +150,7 @@ pub(super) fn draw_view(meta: &PlotMeta, words: &Words<'_>, view: &View<'_>) -> 
         let plot =
             Area { left: area.left + Lanes::NAMES, top, right: area.right - 24, bottom: top + BUS + 12 + lanes_height };
         let start = cycle.bars.iter().map(|bar| view.us(bar.start)).fold(0.0, f64::min);
-        // A planned cycle can be longer than T_DP.
-        let end = view.quiet().max(next.1);
+        let end = view.end();
         let air = end * 0.005;
         let ruler = Ruler::draw(canvas, plot, Axis::linear("time from t0 [us]", start - air, end + air));
         bus_lane(canvas, view, &ruler, Area { bottom: top + BUS, ..plot });
@@ -214,6 +218,8 @@ fn names(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, bottom: i32) {
     let mut all: Vec<(Kind, i32, String)> =
         asking.map(|bar| (bar.kind, centre(view.us(bar.start), view.us(bar.end)), name(bar))).collect();
     all.push((Kind::Synch, centre(view.next.0, view.next.1), "SYNCH".to_owned()));
+    // The next SYNCH of a plan can come before the end of its cycle.
+    all.sort_by_key(|entry| entry.1);
     let (slaves, rare): (Vec<_>, Vec<_>) = all.into_iter().partition(|entry| entry.0 == Kind::Request);
     let width = |name: &str| text_width(name, LETTERS) + 6;
     let wanted: Vec<(i32, i32)> = rare.iter().map(|entry| (entry.1, width(&entry.2))).collect();
