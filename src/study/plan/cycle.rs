@@ -209,9 +209,9 @@ pub fn message_cycle(bus: &BusParams, outputs: usize, inputs: usize, t_sdr: Tbit
 }
 
 /// The shortest T_TR of a ring of `masters` (t_bit): n (T_TC + T_MC) + k T_MC, each with one high-priority message cycle
-/// `t_mc` per rotation and `low` low-priority ones altogether; `t_tc` is a token with what follows it (EN 50170-2).
-pub fn t_tr_min(masters: u32, t_tc: Tbit, t_mc: Tbit, low: u32) -> Tbit {
-    Tbit(masters * (t_tc.0 + t_mc.0) + low * t_mc.0)
+/// T_MC = `message` per rotation and `low` low-priority ones altogether; T_TC = `token` with what follows it (EN 50170-2).
+pub fn t_tr_min(masters: u32, token: Tbit, message: Tbit, low: u32) -> Tbit {
+    Tbit(masters * (token.0 + message.0) + low * message.0)
 }
 
 /// Smallest T_O on `grid` that exceeds T_DX + T_O_MIN (manual 3.3.6: strictly).

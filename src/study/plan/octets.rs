@@ -55,7 +55,11 @@ pub fn hex(octets: &[u8]) -> String {
     octets.iter().map(|octet| format!("{octet:02X}")).collect::<Vec<_>>().join(" ")
 }
 
-/// Set_Prm and Chk_Cfg of `slave` in `scenario`.
+/// Set_Prm and Chk_Cfg of `slave` in `scenario`. A time that no step of its grid hits is cut to the step below, one that is
+/// too long for its octets to the longest.
+///
+/// # Panics
+/// If the scenario breaks a rule that reading it to plan checks.
 pub fn telegrams(scenario: &Scenario, slave: &Slave) -> [Written; 2] {
     // Slave_Diag is the first request, Get_Cfg the second if the master asks for it.
     let mut fcb = Fcb::First.next();

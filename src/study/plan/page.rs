@@ -64,7 +64,7 @@ fn head(facts: &Facts<'_>, lines: &mut Vec<String>) {
 }
 
 /// Slaves in groups: each alone, or of many those that `same` takes for equal.
-fn groups<'a>(scenario: &'a Scenario, same: impl Fn(&Slave, &Slave) -> bool) -> Vec<Vec<&'a Slave>> {
+fn groups(scenario: &Scenario, same: impl Fn(&Slave, &Slave) -> bool) -> Vec<Vec<&Slave>> {
     let slaves: Vec<_> = scenario.configured().collect();
     let many = slaves.len() > SLAVES;
     slaves.chunk_by(|a, b| many && same(a, b)).map(<[_]>::to_vec).collect()
@@ -76,8 +76,8 @@ fn names(group: &[&Slave]) -> String {
 }
 
 /// One value, or the first and the last.
-fn span_of(first: String, last: String) -> String {
-    if first == last { first } else { format!("{first}..{last}") }
+fn span_of(first: &str, last: &str) -> String {
+    if first == last { first.to_owned() } else { format!("{first}..{last}") }
 }
 
 fn exchange(facts: &Facts<'_>, lines: &mut Vec<String>) {
@@ -91,7 +91,7 @@ fn exchange(facts: &Facts<'_>, lines: &mut Vec<String>) {
     let rows = groups(scenario, same).into_iter().filter_map(|group| {
         let ends = group.first().and_then(|slave| slot(slave)).zip(group.last().and_then(|slave| slot(slave)));
         ends.map(|(first, last)| {
-            let both = |of: &dyn Fn(&Slot) -> String| span_of(of(&first), of(&last));
+            let both = |of: &dyn Fn(&Slot) -> String| span_of(&of(&first), &of(&last));
             vec![
                 names(&group),
                 group[0].device.name.to_owned(),
@@ -146,7 +146,7 @@ fn shares(facts: &Facts<'_>, lines: &mut Vec<String>) {
 
 /// A range of times, or that there is none.
 fn allowed(low: Span, high: Span) -> String {
-    if low > high { "none".to_owned() } else { span_of(low.to_string(), high.to_string()).replace("..", " .. ") }
+    if low > high { "none".to_owned() } else { span_of(&low.to_string(), &high.to_string()).replace("..", " .. ") }
 }
 
 fn instants(facts: &Facts<'_>, lines: &mut Vec<String>) {
