@@ -612,3 +612,51 @@ fn every_rule_finds_something() {
         assert!(!rule.source.is_empty() && found.iter().all(|found| !found.terms.is_empty()), "{}", rule.text);
     }
 }
+
+/// The page of three encoders, whose numbers follow from T_ID2 800, requests 143, T_SDR 200, replies 231, T_ID1 76 t_bit.
+#[test]
+fn a_page_shows_the_cycle_its_shares_and_its_instants() {
+    let page = call(&Room::new(), THREE, &[]).1;
+    let expected = "\
+three: master 2, 3 slaves, 0 links, 12 Mbit/s, cable 0 m
+T_DP 2 ms, its content needs 500 us   T_DX 222.833 us at most (MaxTsdr), 180.333 us expected (own T_SDR)
+T_ID1 76 tbit   T_ID2 800 tbit   T_SL 1000 tbit   bit 83.333 ns
+
+Data_Exchange at the longest, from t0 (last bit of SYNCH); T_S to T_ID1 in tbit
+slave  device                     T_S  T_SDR  T_R  2 T_TD  T_ID1  T_MC tbit  T_MC us  request us  reply ends us
+6      simodrive-sensor-isochron  143    200  231       0     76        650   54.167      66.667        114.500
+7      simodrive-sensor-isochron  143    200  231       0     76        650   54.167     120.833        168.667
+8      simodrive-sensor-isochron  143    200  231       0     76        650   54.167     175.000        222.833
+
+share of the cycle                    tbit        us  of T_DP
+T_DX: T_ID2 and every Data_Exchange   2674   222.833   11.1 %
+GAP: T_ID1, FDL status, T_SL          1142    95.167    4.8 %
+token: T_ID1, 3 octets                 109     9.083    0.5 %
+SYNCH: T_ID1, T_GC of 13 octets        219    18.250    0.9 %
+spare: acyclic messages, silence     19856  1654.667   82.7 %
+T_DP                                 24000  2000.000  100.0 %
+
+slave     T_I           allowed     T_O            allowed  T_PLL_W        allowed  dead time
+6..8   125 us  125 us .. 1.5 ms  375 us  375 us .. 1.75 ms     1 us  1 us .. 20 us     2.5 ms
+T_M 222.833 us: the master application may compute from then on, for 1.777 ms (T_MAPC 1 x T_DP - T_DX)
+dead time = T_I + T_MAPC x T_DP + T_O: latch, data in the next cycle, compute, set point in the cycle after
+
+                   O                                                                          I
+|...DDDddDDDGGGGGt..................................................................................S|
+0                                                                                                 2 ms
+";
+    assert!(page.starts_with(expected), "\n{page}");
+}
+
+/// Of 122 slaves the page is no longer than of nine, and no line is wider than a wide terminal.
+#[test]
+fn a_page_of_many_slaves_fits() {
+    let many = THREE.replace("6..8", "3..124").replace("2 ms", "16 ms").replace("375 us", "12 ms");
+    for scenario in [THREE.to_owned(), many.clone(), many.replace("16 ms", "1 ms")] {
+        let page = call(&Room::new(), &scenario, &[]).1;
+        assert!(page.lines().count() <= 95, "{page}");
+        assert!(page.lines().all(|line| line.chars().count() <= 140), "{page}");
+    }
+    let page = call(&Room::new(), &many, &[]).1;
+    assert!(page.contains("\n3..124  simodrive-sensor-isochron  143    200  231"), "{page}");
+}

@@ -55,7 +55,7 @@ fn head(facts: &Facts<'_>, lines: &mut Vec<String>) {
     ));
     let shortest = scenario.configured().map(|slave| plan.t_dp_min(slave.device)).max().unwrap_or_default();
     lines.push(format!(
-        "T_DP {}, shortest for this cycle {shortest}   T_DX {} at most (MaxTsdr), {} expected (own T_SDR)",
+        "T_DP {}, its content needs {shortest}   T_DX {} at most (MaxTsdr), {} expected (own T_SDR)",
         scenario.master.t_dp,
         plan.t_dx,
         Plan::expected(scenario).t_dx
@@ -242,17 +242,17 @@ fn beside(facts: &Facts<'_>, lines: &mut Vec<String>) {
     let (scenario, plan) = (facts.scenario, &facts.plan);
     let bus = &scenario.bus.params;
     let spare = plan.spare(scenario.master.t_dp);
-    let fits = |span: Span| if span <= spare { "fits" } else { "does not fit" };
     let (read, repeat) = (plan.acyclic(bus, READ.0, READ.1), plan.repeat(bus));
     let free = plan.free_running(bus);
     lines.push(String::new());
-    lines.push(format!(
-        "into the spare time of {spare}: an acyclic message with {} octets back, {read}, {}; a repeated Data_Exchange, \
-         {repeat}, {}",
-        READ.1,
-        fits(read),
-        fits(repeat)
-    ));
+    for (what, span) in [
+        ("a repeated Data_Exchange: T_S, T_SL, T_ID1".to_owned(), repeat),
+        (format!("an acyclic message with {} octets back", READ.1), read),
+        ("a Global_Control that tells the mode, with T_ID2".to_owned(), plan.mode(bus)),
+    ] {
+        let fits = if span <= spare { "fits into" } else { "does not fit into" };
+        lines.push(format!("{what}, {span}, {fits} the spare time"));
+    }
     let exchange = plan.slots.iter().map(|slot| slot.t_mc(bus)).max().unwrap_or_default();
     let t_mc = Tbit(exchange.ceil_to(bus.rate.bit()).div_floor(bus.rate.bit()) as u32);
     let t_tr = t_tr_min(1, super::TOKEN + bus.t_id1(), t_mc, 1);
@@ -364,7 +364,7 @@ fn rules(findings: &[Finding], lines: &mut Vec<String>) {
         let near = match nearest(side, findings) {
             Some(near) => format!("nearest {} = {near}", side.key.name),
             None if side.follows => side.fault.as_ref().map_or_else(String::new, |fault| fault.help.clone()),
-            None => format!("no {} does with the other values as they are", side.key.name),
+            None => format!("no {} does with the other values as they are: --propose", side.key.name),
         };
         let word = if line.rule.weight == Weight::Must { "violated" } else { "warning" };
         lines.push(format!("{word}: {}: {message}; {near}", line.who()).trim_end_matches("; ").to_owned());

@@ -293,6 +293,17 @@ good.toml:9:8: bus.rate: "10 Mbit/s" is not a bit rate of PROFIBUS DP; the neare
 "#,
         ),
         (
+            "12 Mbit/s",
+            "12 Mbit/s\"\nt_sl = \"1200 tbit\"\nt_set = \"120 tbit",
+            r#"
+good.toml:11:9: bus.t_set: T_ID1 = 284 tbit is more than publisher 3 can be told
+  11 | t_set = "120 tbit"
+     |         ^^^^^^^^^^
+  rule: a publisher's min_TSDR is T_ID1 = 35 + 2 T_SET + T_QUI, at most 255 (Set_Prm octet 4, Model: D27)
+  help: t_set = "105 tbit" or less, or no links
+"#,
+        ),
+        (
             "cable = \"100 m\"",
             "cable = \"20 km\"",
             r#"
