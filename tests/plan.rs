@@ -8,7 +8,7 @@ use isodp::observation::{GapAnswer, Observation, Phase, SlaveState};
 use isodp::study::plan::finding::{Finding, nearest};
 use isodp::study::plan::proposal::Proposal;
 use isodp::study::plan::rules::{self, Facts, Weight};
-use isodp::study::plan::{self, Plan, message_cycle, octets, smallest_t_o, t_tr_min};
+use isodp::study::plan::{self, Plan, message_cycle, octets, smallest_t_o};
 use isodp::study::scenario::Scenario;
 use isodp::time::{BitRate, Span, Tbit, Time};
 use isodp::wire::Address;
@@ -76,10 +76,10 @@ fn v16_default_times_and_t_id1_of_every_rate() {
 #[test]
 fn v17_shortest_target_rotation_time() {
     let bus = BusParams::profile(BitRate::M1_5);
-    let (token, message) = (plan::TOKEN + bus.t_id1(), message_cycle(&bus, 4, 12, Tbit(32)));
+    let (token, message) = (bus.t_tc(), message_cycle(&bus, 4, 12, Tbit(32)));
     assert_eq!((token, message), (Tbit(70), Tbit(443)));
-    assert_eq!(t_tr_min(1, token, message, 0), Tbit(513));
-    assert_eq!(t_tr_min(3, token, message, 2), Tbit(3 * 513 + 2 * 443));
+    assert_eq!(bus.least_t_tr(1, 0, message), Tbit(513));
+    assert_eq!(bus.least_t_tr(3, 2, message), Tbit(3 * 513 + 2 * 443));
 }
 
 /// SINAMICS S120: T_DX 3600 units, T_O_MIN 1 step of 125 us; T_O is 4 steps, T_I 2, T_DP 8.
@@ -101,7 +101,7 @@ fn v21_clocking_dialog() {
         let scenario = to_plan(&text);
         let facts = Facts::of(&scenario);
         assert_eq!(facts.plan.t_dx, BitRate::M1_5.span(Tbit(674)));
-        assert_eq!(facts.plan.t_o_min(scenario.slaves[0].device), Span::from_us(625));
+        assert_eq!(facts.plan.t_o_min(&scenario.slaves[0].device), Span::from_us(625));
         let near = nearest_of(&facts.findings(), "slave.3.t_i").expect("a T_I");
         assert_eq!(near, "875 us", "the latest T_I that is shorter than T_DP");
         let proposed = Proposal::of(&scenario).expect("times").scenario.slaves[0].times;
@@ -230,9 +230,13 @@ proptest! {
     }
     /// The rule behind V17: one more master adds a token and a message, one more low-priority message its own length.
     #[test]
-    fn a_rotation_grows_with_masters_and_messages(n in 1u32..30, k in 0u32..50, tc in 33u32..500, mc in 200u32..9_000) {
-        let t_tr = |n, k| t_tr_min(n, Tbit(tc), Tbit(mc), k).0;
-        prop_assert_eq!(t_tr(n + 1, k) - t_tr(n, k), tc + mc);
+    fn a_rotation_grows_with_masters_and_messages(
+        rate in prop::sample::select(BitRate::ALL),
+        (n, k, mc) in (1u32..30, 0u32..50, 200u32..9_000),
+    ) {
+        let bus = BusParams::profile(rate);
+        let t_tr = |n, k| bus.least_t_tr(n, k, Tbit(mc)).0;
+        prop_assert_eq!(t_tr(n + 1, k) - t_tr(n, k), 33 + bus.t_id1().0 + mc);
         prop_assert_eq!(t_tr(n, k + 1) - t_tr(n, k), mc);
     }
     /// The rule behind V8 and V21: the smallest point of the grid above the bound.
@@ -603,7 +607,7 @@ fn the_worst_scenario_can_be_planned() {
 fn every_rule_finds_something() {
     let drive = "functions = true\nscaling = { units_per_rev = 100, total_range = 12800 }\n[[slave]]\naddress = 9\ndevice = \
                  \"subscriber-drive\"\n[[link]]\npublisher = 6\nsubscriber = 9\n";
-    let jitter = "gc_jitter = { kind = \"normal\", sigma = \"10 ns\" }\n[[slave]]";
+    let jitter = "data_control_time = \"1 s\"\ngc_jitter = { kind = \"normal\", sigma = \"10 ns\" }\n[[slave]]";
     let scenario = to_plan(&[&THREE.replacen("[[slave]]", jitter, 1), drive].concat());
     let facts = Facts::of(&scenario);
     for rule in rules::ALL.iter().copied().flatten() {

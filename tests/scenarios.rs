@@ -51,7 +51,7 @@ fn every_shipped_scenario_has_a_test_and_says_what_it_asks() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     let files = std::fs::read_dir(directory).expect("the scenarios").map(|entry| entry.expect("a file").path());
     let names: BTreeSet<_> = files.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect();
-    let tested = || TESTS.iter().chain(crate::encoder_scenarios::TESTS);
+    let tested = || TESTS.iter().chain(crate::encoder_scenarios::TESTS).chain(crate::dxb::TESTS);
     assert_eq!(names, tested().map(|(name, _)| format!("{name}.toml")).collect());
     for &(name, _) in tested() {
         let question = scenario(name, &[]).question;
@@ -469,7 +469,7 @@ fn slow_bus() {
     let bits = 150 + 3 * (143 + 150 + 231) + 2 * 37;
     let line = Span::from_us(4);
     assert!((plan.t_dx - tbit(&network, bits) - line).abs() <= Span::from_ticks(6), "{}", plan.t_dx);
-    assert_eq!(plan.t_o_min(network.slaves[0].device), network.slaves[0].times.t_o);
+    assert_eq!(plan.t_o_min(&network.slaves[0].device), network.slaves[0].times.t_o);
     assert_undisturbed(&network, &run);
     assert_t_dx(&network, &run, last_lock(&run));
     assert_latch_offsets(&network, &run, Span::from_ns(400));
@@ -481,7 +481,7 @@ fn fast_cycle() {
     let network = scenario("fast-cycle", &[]);
     let run = Run::of(&network);
     let plan = Plan::of(&network);
-    assert_eq!(plan.t_o_min(network.slaves[0].device), Span::from_us(625));
+    assert_eq!(plan.t_o_min(&network.slaves[0].device), Span::from_us(625));
     assert_undisturbed(&network, &run);
     assert_t_dx(&network, &run, last_lock(&run));
     assert_latch_offsets(&network, &run, Span::from_ns(400));
@@ -534,7 +534,7 @@ fn full_segment() {
     let run = Run::of(&network);
     let plan = Plan::of(&network);
     assert_eq!(1 + network.slaves.len(), 32);
-    let device = network.slaves[0].device;
+    let device = &network.slaves[0].device;
     let bits = 800 + 31 * (143 + 800 + 231) + 30 * 76;
     // Slaves sit at 1/31 to 31/31 of 500 ns: twice 16 times 500 ns for all.
     let line = Span::from_us(16);

@@ -50,9 +50,9 @@ fn timed(encoders: u8, t_dp: Span, t_o: Span) -> Scenario {
 pub(crate) fn scenario(encoders: u8) -> Scenario {
     let roomy = timed(encoders, Span::from_ms(32), Span::from_us(31_500));
     let (plan, slave) = (Plan::of(&roomy), &roomy.slaves[0]);
-    let t_o = plan.t_o_min(slave.device);
+    let t_o = plan.t_o_min(&slave.device);
     let t_dp = t_o + slave.times.t_i + slave.device.gap_min(slave.functions);
-    let t_dp = t_dp.ceil_to(slave.device.dp_grid()).max(plan.t_dp_min(slave.device));
+    let t_dp = t_dp.ceil_to(slave.device.dp_grid()).max(plan.t_dp_min(&slave.device));
     timed(encoders, t_dp, t_o)
 }
 

@@ -180,7 +180,7 @@ impl Times {
 impl Slave {
     fn new(scenario: &Scenario, slave: &scenario::Slave, start: &StartUp) -> Self {
         let bus = &scenario.bus.params;
-        let profile = slave.device;
+        let profile = &slave.device;
         let (steps, revolutions) = (profile.steps_per_rev, profile.revolutions);
         let times = slave.times;
         let settings = PllSettings::new(scenario.master.t_dp, times.t_pll_w, times.t_pll_d);

@@ -5,21 +5,27 @@
 //! and the rules of the bus and of the devices are checked on the whole. What is wrong on the way is collected
 //! into one [`ScenarioError`].
 
+mod acyclic;
 mod check;
+mod class2;
 pub mod error;
 #[cfg(test)]
 mod faults;
 pub mod kinds;
+mod link;
 mod options;
 mod read;
 mod section;
+mod services;
 mod tree;
 
 use check::Check;
+pub use class2::{Class2, Class2Job};
 pub use error::{Fault, Position, Problem, ScenarioError};
+pub use link::{Link, Sample, Table};
 
 use crate::device::options::{Resolution, UnitOptions};
-use crate::device::profile::Profile;
+use crate::device::profile::Device;
 pub use crate::dp::handler::{Patch, StartupTelegram};
 use crate::fdl::params::BusParams;
 pub use crate::sim::fault::{Bursts, Disturbance, Service};
@@ -27,9 +33,11 @@ use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
+use crate::wire::control::GlobalControl;
 pub use crate::wire::parameter::Format;
 use section::Reader;
 pub(super) use section::suggestion;
+pub use services::{MasterServices, SlaveServices};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -46,10 +54,12 @@ pub struct Scenario {
     pub run: Run,
     /// The line.
     pub bus: Bus,
-    /// The only master.
+    /// The master of the slaves.
     pub master: Master,
     /// The slaves in address order, which is the order of Data_Exchange (Model: D6).
     pub slaves: Vec<Slave>,
+    /// Class 2 masters in the order of the file.
+    pub class2: Vec<Class2>,
     /// Slave-to-slave links in the order of the file.
     pub links: Vec<Link>,
     /// Orders in the order of the file; at one instant this is the order in which they act.
@@ -280,6 +290,10 @@ pub struct Master {
     pub life_delay: u32,
     /// Whether further tokens to itself fill the spare time (Model: D6).
     pub active_spare: bool,
+    /// C1_Response_Timeout, after which an acyclic request over MS1 is given up; a multiple of 10 ms (GSD).
+    pub ms1_timeout: Span,
+    /// How it watches and tells its slaves.
+    pub services: MasterServices,
 }
 
 /// How far a crystal is off its nominal frequency (10^-9), positive is fast.
@@ -328,7 +342,7 @@ pub struct Slave {
     /// Its address, 0..=125.
     pub address: Address,
     /// What it is.
-    pub device: &'static Profile,
+    pub device: Device,
     /// Where on the cable it sits (mm).
     pub position_mm: u64,
     /// How far its crystal is off.
@@ -351,6 +365,8 @@ pub struct Slave {
     pub silent: bool,
     /// When its supply comes on (true time).
     pub powered_at: Span,
+    /// What it is parameterised for besides Data_Exchange.
+    pub services: SlaveServices,
     /// Where it differs from the model's defaults (Model: D11, D12, D14 to D16, D18, D21).
     pub options: UnitOptions,
 }
@@ -391,19 +407,6 @@ pub struct Scaling {
     pub units_per_rev: u32,
     /// Total measuring range (counts), octets 20..=23 (manual 3.2.4).
     pub total_range: u32,
-}
-
-/// One slave-to-slave link (manual 3.4).
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Link {
-    /// Whose inputs.
-    pub publisher: Address,
-    /// Who takes them.
-    pub subscriber: Address,
-    /// Where the sample begins in the publisher's inputs (octets).
-    pub offset: u8,
-    /// Length of the sample (octets).
-    pub length: u8,
 }
 
 /// An order at an instant.
@@ -483,6 +486,8 @@ pub enum Action {
     Clear,
     /// The master changes to Operate.
     Operate,
+    /// The master sends Sync, Freeze or their ends to these groups.
+    Control(GlobalControl),
 }
 
 /// What a run keeps.
@@ -530,12 +535,13 @@ pub(crate) mod tests {
     use crate::time::BitRate;
 
     /// `n` slaves of the kind `device` from address 3 on at a bus without length, T_DP 8 ms.
-    pub(crate) fn network(rate: BitRate, device: &'static Profile, n: u8) -> Scenario {
+    pub(crate) fn network(rate: BitRate, device: impl Into<Device>, n: u8) -> Scenario {
+        let device = device.into();
         let address = |number| Address::new(number).unwrap();
         let (t_i, t_o, t_pll_w) = (Span::from_us(125), Span::from_ms(4), Span::from_us(1));
         let slave = |number| Slave {
             address: address(number),
-            device,
+            device: device.clone(),
             position_mm: 0,
             crystal: Crystal::Offset(0),
             t_sdr: Tbit(30),
@@ -547,6 +553,7 @@ pub(crate) mod tests {
             scaling: None,
             silent: false,
             powered_at: Span::ZERO,
+            services: SlaveServices::default(),
             options: UnitOptions::default(),
         };
         Scenario {
@@ -570,8 +577,11 @@ pub(crate) mod tests {
                 life_start: 1,
                 life_delay: 0,
                 active_spare: false,
+                ms1_timeout: Span::from_s(10),
+                services: MasterServices::default(),
             },
             slaves: (3..3 + n).map(slave).collect(),
+            class2: Vec::new(),
             links: Vec::new(),
             events: Vec::new(),
             disturbances: Vec::new(),

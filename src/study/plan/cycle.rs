@@ -208,12 +208,6 @@ pub fn message_cycle(bus: &BusParams, outputs: usize, inputs: usize, t_sdr: Tbit
     Tbit::of_octets(2 * OVERHEAD + outputs + inputs) + t_sdr + bus.t_id1()
 }
 
-/// The shortest T_TR of a ring of `masters` (t_bit): n (T_TC + T_MC) + k T_MC, each with one high-priority message cycle
-/// T_MC = `message` per rotation and `low` low-priority ones altogether; T_TC = `token` with what follows it (EN 50170-2).
-pub fn t_tr_min(masters: u32, token: Tbit, message: Tbit, low: u32) -> Tbit {
-    Tbit(masters * (token.0 + message.0) + low * message.0)
-}
-
 /// Smallest T_O on `grid` that exceeds T_DX + T_O_MIN (manual 3.3.6: strictly).
 pub const fn smallest_t_o(t_dx: Span, t_o_min: Span, grid: Span) -> Span {
     let bound = t_dx.ticks() + t_o_min.ticks();
@@ -344,7 +338,7 @@ mod tests {
         let mut network = network(BitRate::M1_5, find("simodrive-sensor-isochron").unwrap(), 1);
         let alone = Plan::of(&network).t_dx;
         let publisher = network.slaves[0].address;
-        network.links.push(Link { publisher, subscriber: Address::new(9).unwrap(), offset: 4, length: 4 });
+        network.links.push(Link::of(publisher, Address::new(9).unwrap(), 4, 4));
         assert_eq!(Plan::of(&network).t_dx - alone, BitRate::M1_5.span(Tbit(37 - 25)));
     }
 

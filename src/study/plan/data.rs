@@ -50,7 +50,7 @@ struct FreeRunning {
 #[derive(Serialize)]
 struct SlaveData {
     address: u8,
-    device: &'static str,
+    device: String,
     t_s_tbit: u32,
     t_sdr_tbit: u32,
     t_r_tbit: u32,
@@ -127,7 +127,7 @@ pub(super) fn json(facts: &Facts<'_>, findings: &[Finding]) -> Result<String, se
 fn cycle(facts: &Facts<'_>) -> Cycle {
     let (scenario, plan) = (facts.scenario, &facts.plan);
     let (bus, master, us) = (&scenario.bus.params, &scenario.master, Decimal::us);
-    let shortest = scenario.configured().map(|slave| plan.t_dp_min(slave.device)).max().unwrap_or_default();
+    let shortest = scenario.configured().map(|slave| plan.t_dp_min(&slave.device)).max().unwrap_or_default();
     Cycle {
         t_dp_us: us(master.t_dp),
         t_dp_min_us: us(shortest),
@@ -155,7 +155,7 @@ fn slave_data(facts: &Facts<'_>, slave: &Slave) -> SlaveData {
     let [prm, cfg] = octets::telegrams(scenario, slave);
     SlaveData {
         address: slave.address.get(),
-        device: slave.device.name,
+        device: slave.device.name.to_string(),
         t_s_tbit: slot.map_or(0, |slot| slot.t_s.0),
         t_sdr_tbit: slot.map_or(0, |slot| slot.t_sdr.0),
         t_r_tbit: slot.map_or(0, |slot| slot.t_r.0),
@@ -167,7 +167,7 @@ fn slave_data(facts: &Facts<'_>, slave: &Slave) -> SlaveData {
         t_i_min_us: us(slave.device.t_i_min(slave.functions)),
         t_i_max_us: us(plan.t_i_max(slave, master.t_dp)),
         t_o_us: us(times.t_o),
-        t_o_min_us: us(plan.t_o_min(slave.device)),
+        t_o_min_us: us(plan.t_o_min(&slave.device)),
         t_o_max_us: us(plan.t_o_max(slave, master.t_dp)),
         t_pll_w_us: us(times.t_pll_w),
         dead_time_us: us(dead_time(times.t_i, times.t_o, master.t_dp, master.t_mapc)),

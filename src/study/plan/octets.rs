@@ -4,7 +4,9 @@ use crate::dp::{CHK_CFG, SET_PRM};
 use crate::study::build;
 use crate::study::scenario::{Scenario, Slave};
 use crate::time::Span;
-use crate::wire::prm::{Block, BlockType, DpV1Status, DxbLinks, EncoderOptions, IsoM, SetPrm, UserPrm81};
+use crate::wire::prm::{
+    Block, BlockType, DpV1Status, DxbLinks, DxbSubscriptions, EncoderOptions, IsoM, SetPrm, UserPrm81,
+};
 use crate::wire::{Address, Fcb, Frame, Header, Sap, Service};
 
 /// Some octets of a data unit that mean one thing.
@@ -66,7 +68,7 @@ pub fn telegrams(scenario: &Scenario, slave: &Slave) -> [Written; 2] {
     if scenario.master.get_cfg {
         fcb = fcb.next();
     }
-    let (prm, cfg) = (build::set_prm(scenario, slave), slave.device.config);
+    let (prm, cfg) = (build::set_prm(scenario, slave), &slave.device.config);
     let written = |name, (dsap, ssap): (Sap, Sap), fcb, fields: Vec<Field>, du: &[u8]| {
         let header = Header::request(slave.address, scenario.master.address, Service::SrdHigh, fcb);
         let mut frame = Frame::new();
@@ -163,6 +165,11 @@ fn block_fields(cutter: &mut Cutter<'_>, block: &Block<'_>) {
                 return link_fields(cutter, &links);
             }
         }
+        BlockType::DxbSubscriptions => {
+            if let Ok(subscriptions) = DxbSubscriptions::parse(block) {
+                return subscription_fields(cutter, &subscriptions);
+            }
+        }
         _ => {}
     }
     cutter.take(block.data.len(), "  data", "");
@@ -212,6 +219,18 @@ fn link_fields(cutter: &mut Cutter<'_>, links: &DxbLinks<'_>) {
         cutter.take(1, "    its inputs", format!("{} octets", link.length));
         cutter.take(1, "    sample from", format!("octet {}", link.offset));
         cutter.take(1, "    sample length", format!("{} octets", link.sample));
+    }
+}
+
+fn subscription_fields(cutter: &mut Cutter<'_>, subscriptions: &DxbSubscriptions<'_>) {
+    cutter.take(1, "  version", "1");
+    for entry in subscriptions.iter() {
+        cutter.take(1, "  publisher", format!("slave {}", entry.link.publisher));
+        cutter.take(1, "    its inputs", format!("{} octets", entry.link.length));
+        cutter.take(1, "    sample from", format!("octet {}", entry.link.offset));
+        cutter.take(1, "    to slot", entry.slot.to_string());
+        cutter.take(1, "    to", format!("octet {}", entry.destination));
+        cutter.take(1, "    sample length", format!("{} octets", entry.link.sample));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::finding::{Finding, Relation, Subject, nearest};
 use super::rules::{Facts, Rule, Weight};
-use super::{Plan, Slot, computing_time, dead_time, t_tr_min};
+use super::{Plan, Slot, computing_time, dead_time};
 use crate::study::report::{aligned, number, ranges};
 use crate::study::scenario::{Scenario, Slave};
 use crate::time::{Span, Tbit};
@@ -53,7 +53,7 @@ fn head(facts: &Facts<'_>, lines: &mut Vec<String>) {
         bus.rate,
         scenario.bus.cable_mm as f64 / 1e3,
     ));
-    let shortest = scenario.configured().map(|slave| plan.t_dp_min(slave.device)).max().unwrap_or_default();
+    let shortest = scenario.configured().map(|slave| plan.t_dp_min(&slave.device)).max().unwrap_or_default();
     lines.push(format!(
         "T_DP {}, its content needs {shortest}   T_DX {} at most (MaxTsdr), {} expected (own T_SDR)",
         scenario.master.t_dp,
@@ -94,7 +94,7 @@ fn exchange(facts: &Facts<'_>, lines: &mut Vec<String>) {
             let both = |of: &dyn Fn(&Slot) -> String| span_of(&of(&first), &of(&last));
             vec![
                 names(&group),
-                group[0].device.name.to_owned(),
+                group[0].device.name.to_string(),
                 first.t_s.0.to_string(),
                 first.t_sdr.0.to_string(),
                 first.t_r.0.to_string(),
@@ -156,7 +156,7 @@ fn instants(facts: &Facts<'_>, lines: &mut Vec<String>) {
     let slaves: Vec<_> = scenario.configured().collect();
     let rows = slaves.chunk_by(|a, b| same(a, b)).map(|group| {
         let slave = group[0];
-        let (times, device) = (slave.times, slave.device);
+        let (times, device) = (slave.times, &slave.device);
         let widest = Span::from_iso_units(device.t_pll_w_max.into());
         vec![
             names(group),
@@ -255,7 +255,7 @@ fn beside(facts: &Facts<'_>, lines: &mut Vec<String>) {
     }
     let exchange = plan.slots.iter().map(|slot| slot.t_mc(bus)).max().unwrap_or_default();
     let t_mc = Tbit(exchange.ceil_to(bus.rate.bit()).div_floor(bus.rate.bit()) as u32);
-    let t_tr = t_tr_min(1, super::TOKEN + bus.t_id1(), t_mc, 1);
+    let t_tr = bus.least_t_tr(1, 1, t_mc);
     lines.push(format!(
         "without SYNCH a cycle takes {}, {} with a GAP poll; T_TR >= {t_tr} with one low-priority message per rotation",
         free.cycle, free.with_gap

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::finding::{Amount, Finding, Key, Subject, nearest};
+use super::rules::services::LEAST_CONTROL_CYCLES;
 use super::rules::{Facts, Weight, stray};
 use super::{Plan, smallest_t_o};
 use crate::fdl::params::BusParams;
@@ -10,7 +11,7 @@ use crate::sim::noise::GcJitter;
 use crate::study::build;
 use crate::study::quantity;
 use crate::study::report::ranges;
-use crate::study::scenario::{CodeSequence, Crystal, Extent, Scenario, Slave, Watchdog};
+use crate::study::scenario::{CodeSequence, Crystal, Extent, Link, Sample, Scenario, Slave, Watchdog};
 use crate::time::{Span, Tbit};
 
 /// Cycles that a watchdog outlasts at least: a slave's start-up takes a service every other cycle. Model: with one to
@@ -51,6 +52,9 @@ impl Proposal {
         let outlasts = |watchdog: Watchdog| watchdog.span() > network.master.t_dp * WATCHDOG_CYCLES;
         network.master.watchdog =
             network.master.watchdog.map(|watchdog| if outlasts(watchdog) { watchdog } else { WATCHDOG });
+        let services = &mut network.master.services;
+        services.data_control_time =
+            services.data_control_time.map(|time| time.max(network.master.t_dp * LEAST_CONTROL_CYCLES));
         let findings = Facts::of(&network).findings();
         let broken: Vec<_> =
             findings.into_iter().filter(|found| found.rule.weight == Weight::Must && !found.holds()).collect();
@@ -63,16 +67,15 @@ impl Proposal {
         }
     }
 
-    /// The proposed network as the text of a scenario: the bus, the master, the slaves and the links. Motions, events and
-    /// disturbances are not part of it.
+    /// The proposed network as the text of a scenario: the bus, the master, the slaves and the links. Motions, events,
+    /// disturbances and class 2 masters are not part of it.
     pub fn text(&self) -> String {
         let mut text = String::new();
         head(&mut text, self);
         master(&mut text, &self.scenario);
         slaves(&mut text, &self.scenario);
         for link in &self.scenario.links {
-            let _ = write!(text, "\n[[link]]\npublisher = {}\nsubscriber = {}\n", link.publisher, link.subscriber);
-            let _ = write!(text, "offset = {}\nlength = {}\n", link.offset, link.length);
+            link_table(&mut text, link);
         }
         text
     }
@@ -164,7 +167,7 @@ fn shortest_t_dp(network: &Scenario, plan: &Plan) -> Span {
         let times = slave.times.t_o + slave.device.gap_min(slave.functions) + slave.times.t_i;
         let window = slave.options.pll.min_window * 4;
         let start_up = plan.start_up(network, slave, build::set_prm(network, slave).len());
-        times.max(window).max(start_up).max(slave.device.t_dp_min)
+        times.max(window).max(start_up).max(slave.device.t_dp_min).max(slave.min_slave_interval())
     };
     let shortest = network.configured().map(needed).max().unwrap_or_default().max(whole).max(Span::from_us(500));
     // No T_DP is shorter than a telegram.
@@ -177,8 +180,7 @@ fn head(text: &mut String, proposal: &Proposal) {
     let _ = write!(
         text,
         "# Proposal for {}: the shortest T_DP with which all rules hold.\n#\n# T_DX {} at most; the cycle holds {}, {} is \
-         spare.\n# A repeated Data_Exchange fits before SYNCH from t_dp = \"{}\" on.\n# Motions, events and disturbances \
-         are not part of it.\n\n[run]\nseed = {}\n",
+         spare.\n# A repeated Data_Exchange fits before SYNCH from t_dp = \"{}\" on.\n# Motions, events, disturbances and class 2 mastersare not part of it.\n\n[run]\nseed = {}\n",
         scenario.name,
         plan.t_dx,
         plan.content(),
@@ -230,6 +232,12 @@ fn master(text: &mut String, scenario: &Scenario) {
     let _ = writeln!(text, "get_cfg = {}\ndx_retries = {}", master.get_cfg, master.dx_retries);
     let _ = writeln!(text, "lost_after = {}\nclear_for = {}", master.lost_after, master.clear_for);
     let _ = writeln!(text, "active_spare = {}", master.active_spare);
+    if master.services.auto_clear {
+        let _ = writeln!(text, "auto_clear = true");
+    }
+    if let Some(time) = master.services.data_control_time {
+        let _ = writeln!(text, "data_control_time = \"{}\"", exact(time));
+    }
     let _ = writeln!(text, "life_start = {}\nlife_delay = {}", master.life_start, master.life_delay);
     let _ = writeln!(text, "crystal = {}", crystal(master.crystal));
     let _ = writeln!(text, "gc_jitter = {}", jitter(master.gc_jitter, master.accumulate));
@@ -295,6 +303,7 @@ fn table(slave: &Slave, inherited: &[(&str, Span)], spread: u64, bus: &BusParams
     let pll = slave.options.pll;
     let (least, quantum) = (exact(pll.min_window), exact(pll.quantum));
     let _ = writeln!(text, "pll = {{ min_window = \"{least}\", quantum = \"{quantum}\" }}");
+    services(&mut text, slave);
     if slave.silent {
         let _ = writeln!(text, "silent = true");
     }
@@ -304,10 +313,44 @@ fn table(slave: &Slave, inherited: &[(&str, Span)], spread: u64, bus: &BusParams
     text
 }
 
+fn link_table(text: &mut String, link: &Link) {
+    let _ = write!(text, "\n[[link]]\npublisher = {}\nsubscriber = {}\n", link.publisher, link.subscriber);
+    if let Some(slot) = link.slot() {
+        let _ = write!(text, "table = \"subscriber\"\nslot = {slot}\n");
+    }
+    if let Some(length) = link.publisher_length {
+        let _ = writeln!(text, "publisher_length = {length}");
+    }
+    let samples: Vec<_> = link
+        .samples
+        .iter()
+        .map(|Sample { offset, length, to }| match link.slot() {
+            None => format!("{{ offset = {offset}, length = {length} }}"),
+            Some(_) => format!("{{ offset = {offset}, length = {length}, to = {to} }}"),
+        })
+        .collect();
+    let _ = writeln!(text, "samples = [{}]", samples.join(", "));
+}
+
 /// A span as a scenario can have it, exactly.
 fn exact(span: Span) -> String {
     let shown = span.to_string();
     if quantity::span(&shown, None) == Ok(span) { shown } else { format!("{} tick", span.ticks()) }
+}
+
+fn services(text: &mut String, slave: &Slave) {
+    let services = slave.services;
+    let groups: Vec<_> =
+        (0..7).filter(|bit| services.groups & (1 << bit) != 0).map(|bit| (bit + 1).to_string()).collect();
+    if !groups.is_empty() {
+        let _ = writeln!(text, "groups = [{}]", groups.join(", "));
+    }
+    for (key, _) in [("sync", services.sync), ("freeze", services.freeze)].into_iter().filter(|pair| pair.1) {
+        let _ = writeln!(text, "{key} = true");
+    }
+    if let Some(interval) = services.min_slave_interval {
+        let _ = writeln!(text, "min_slave_interval = \"{}\"", exact(interval));
+    }
 }
 
 fn crystal(crystal: Crystal) -> String {

@@ -7,6 +7,7 @@ mod advice;
 mod bus;
 mod cycle;
 mod instants;
+pub(super) mod services;
 
 use super::Plan;
 use super::finding::{Amount, Finding, Key, Relation};
@@ -81,9 +82,13 @@ pub static CYCLE: &[Rule] = &[
     Rule::must("T_DX < T_DP", "manual 3.3.2", cycle::t_dx_ends),
     Rule::must("T_BASE_DP, T_BASE_IO are time bases", "Set_Prm block 04", cycle::time_bases),
     Rule::must("1 <= T_MAPC <= 14 (T_DP)", "manual 3.3.3, octet 43", cycle::t_mapc),
-    Rule::must("watchdog > T_DP", "Model: one Data_Exchange per cycle", cycle::watchdog_outlasts_t_dp)
-        .or(&["master.t_dp"]),
+    Rule::must("watchdog > T_DP", "Model: an exchange a cycle", cycle::watchdog_outlasts_t_dp).or(&["master.t_dp"]),
     Rule::must("watchdog = 10 ms x WD_Fact_1 x WD_Fact_2", "Set_Prm octets 2, 3", cycle::watchdog_factors),
+];
+/// DP services in operation.
+pub static SERVICES: &[Rule] = &[
+    Rule::must("Min_Slave_Interval <= T_DP", "GSD, Min_Slave_Intervall", services::slave_interval).or(&["master.t_dp"]),
+    Rule::must("Data_Control_Time >= 6 x T_DP", "Model: D5", services::data_control_time),
 ];
 /// T_I, T_O and the window of every slave.
 pub static INSTANTS: &[Rule] = &[
@@ -118,7 +123,7 @@ pub static ADVICE: &[Rule] = &[
 ];
 
 /// Every rule.
-pub static ALL: &[&[Rule]] = &[BUS, CYCLE, INSTANTS, TIMERS, JITTER, START_UP, ADVICE];
+pub static ALL: &[&[Rule]] = &[BUS, CYCLE, SERVICES, INSTANTS, TIMERS, JITTER, START_UP, ADVICE];
 
 /// What the rules look at.
 #[derive(Clone, Debug)]
@@ -142,11 +147,11 @@ impl<'a> Facts<'a> {
         self.scenario.configured()
     }
     /// The devices in the order of their first slaves.
-    fn devices(&self) -> Vec<&'static Profile> {
-        let mut devices: Vec<&'static Profile> = Vec::new();
+    fn devices(&self) -> Vec<&'a Profile> {
+        let mut devices: Vec<&'a Profile> = Vec::new();
         for slave in self.slaves() {
-            if !devices.contains(&slave.device) {
-                devices.push(slave.device);
+            if devices.iter().all(|known| **known != *slave.device) {
+                devices.push(&slave.device);
             }
         }
         devices
@@ -239,6 +244,9 @@ pub fn symbol(key: &'static str) -> &'static str {
         ("t_o", "T_O"),
         ("t_pll_w", "T_PLL_W"),
         ("t_pll_d", "T_PLL_D"),
+        ("t_tr", "T_TR"),
+        ("min_slave_interval", "Min_Slave_Interval"),
+        ("data_control_time", "Data_Control_Time"),
         ("pll.min_window", "narrowest window"),
         ("pll.quantum", "timer step"),
     ];
@@ -259,8 +267,9 @@ pub(super) fn stray(jitter: GcJitter) -> Option<(Span, &'static str)> {
 fn shortest_t_dp(facts: &Facts<'_>) -> String {
     let needed = |slave: &Slave| {
         let gap = slave.device.gap_min(slave.functions);
-        let times = facts.plan.t_o_min(slave.device) + gap + slave.times.t_i.max(slave.device.t_i_min(slave.functions));
-        facts.plan.t_dp_min(slave.device).max(times.ceil_to(slave.device.dp_grid()))
+        let times =
+            facts.plan.t_o_min(&slave.device) + gap + slave.times.t_i.max(slave.device.t_i_min(slave.functions));
+        facts.plan.t_dp_min(&slave.device).max(times.ceil_to(slave.device.dp_grid()))
     };
     let shortest = facts.slaves().map(needed).max().unwrap_or_default();
     format!("the shortest is t_dp = \"{shortest}\"")

@@ -1,15 +1,19 @@
 //! The tree of a scenario becomes a [`Scenario`], table by table and key by key.
 
+use super::acyclic;
+use super::class2;
 use super::error::Fault;
 use super::kinds::{self, ACTIONS, DISTURBANCES, Kind, address};
+use super::link::link;
 use super::options;
 use super::section::{Reader, Section, choice, cycle_time, instant, number, quantity, suggestion, text, yes};
+use super::services;
 use super::tree::{Node, Place, Table, Value};
 use super::{
-    Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Link, Master, Record, Run, Scaling,
-    Scenario, Slave, Watchdog, When,
+    Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Master, Record, Run, Scaling, Scenario,
+    Slave, Watchdog, When,
 };
-use crate::device::profile::{PROFILES, Profile};
+use crate::device::profile::{Device, PROFILES, Profile};
 use crate::fdl::params::BusParams;
 use crate::sim::motion::{Angle, Motion};
 use crate::sim::noise::GcJitter;
@@ -18,7 +22,7 @@ use crate::time::{BitRate, Span, Tbit};
 use crate::wire::Address;
 
 /// The tables of a file; the second half is lists, `[[slave]]`.
-const TABLES: [&str; 8] = ["run", "bus", "master", "record", "slave", "link", "event", "disturbance"];
+const TABLES: [&str; 9] = ["run", "bus", "master", "record", "slave", "class2", "link", "event", "disturbance"];
 /// How many of [`TABLES`] are single tables.
 const SINGLE: usize = 4;
 
@@ -51,6 +55,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         slaves.extend(slave(reader, table, &context));
     }
     let addresses: Vec<_> = slave_tables.iter().map(|table| table.address).collect();
+    let class2 = list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses));
     let links = list(reader, &root, "link", link);
     let events = list(reader, &root, "event", |section, reader| event(section, reader, &addresses));
     let disturbances = list(reader, &root, "disturbance", disturbance);
@@ -62,6 +67,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         bus: bus?,
         master: master?,
         slaves,
+        class2,
         links,
         events,
         disturbances,
@@ -293,7 +299,7 @@ fn bus(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Bus> {
 }
 
 /// A length of cable (mm).
-fn cable(node: &Node) -> Result<u64, Fault> {
+pub(super) fn cable(node: &Node) -> Result<u64, Fault> {
     match quantity("100 m", millimetres)(node)? {
         mm if mm > Bus::MAX_CABLE_MM => Err(Fault::new("no cable is longer than 100 km")),
         mm => Ok(mm),
@@ -320,6 +326,8 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
     let life_start = s.optional(reader, "life_start", number(1..=15)).unwrap_or(1);
     let life_delay = s.optional(reader, "life_delay", number(0..=u32::MAX)).unwrap_or(0);
     let active_spare = s.optional(reader, "active_spare", yes).unwrap_or(false);
+    let ms1_timeout = s.optional(reader, "ms1_timeout", acyclic::timeout).unwrap_or(acyclic::RESPONSE_TIMEOUT);
+    let services = services::master(s, reader);
     section.finish(reader);
     let (address, t_dp) = (address?, t_dp?);
     let master = Master {
@@ -338,6 +346,8 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
         life_start,
         life_delay,
         active_spare,
+        ms1_timeout,
+        services,
     };
     Some((master, times))
 }
@@ -389,7 +399,7 @@ fn watchdog(node: &Node) -> Result<Option<Watchdog>, Fault> {
 }
 
 /// A crystal: `"50 ppm"` or `{ within = "50 ppm" }`.
-fn crystal(reader: &mut Reader<'_>, section: &mut Section<'_>) -> Crystal {
+pub(super) fn crystal(reader: &mut Reader<'_>, section: &mut Section<'_>) -> Crystal {
     let is_table = matches!(section.node("crystal"), Some(Node { value: Value::Table(_), .. }));
     if !is_table {
         let offset = section.optional(reader, "crystal", quantity("50 ppm", ppb));
@@ -418,7 +428,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let mut section = Section::new(format!("slave.{}", from.address), from.place, Some(&from.table));
     let s = &mut section;
     let device = s.required(reader, "device", &format!("\"{}\"", PROFILES[0].name), |node| {
-        choice(node, "device", PROFILES, |profile| profile.name)
+        choice(node, "device", PROFILES, |profile| &profile.name)
     });
     let position_mm = s.optional(reader, "position", cable).unwrap_or(context.position_mm);
     let crystal = crystal(reader, s);
@@ -438,10 +448,11 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let functions = s.optional(reader, "functions", yes).unwrap_or(scaling.is_some());
     let silent = s.optional(reader, "silent", yes).unwrap_or(false);
     let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
+    let services = services::slave(s, reader);
     section.finish(reader);
     let times = iso_times(reader, from, own.or(context.times), context.times.is_some());
-    let (device, bus) = (device?, context.bus?);
-    let t_sdr = t_sdr.unwrap_or_else(|| default_t_sdr(bus, device));
+    let (device, bus) = (Device::from(device?), context.bus?);
+    let t_sdr = t_sdr.unwrap_or_else(|| default_t_sdr(bus, &device));
     Some(Slave {
         address: from.address,
         device,
@@ -456,6 +467,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
         scaling,
         silent,
         powered_at,
+        services,
         options,
     })
 }
@@ -502,17 +514,6 @@ fn scaling(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Scaling>
     Some(Scaling { units_per_rev: units_per_rev?, total_range: total_range? })
 }
 
-/// Reads one `[[link]]`.
-fn link(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Link> {
-    let publisher = section.required(reader, "publisher", "3", address);
-    let subscriber = section.required(reader, "subscriber", "11", address);
-    // G1_XIST1 of telegram 81 (manual 2.2).
-    let offset = section.optional(reader, "offset", number(0..=u8::MAX)).unwrap_or(4);
-    let length = section.optional(reader, "length", number(0..=u8::MAX)).unwrap_or(4);
-    section.finish(reader);
-    Some(Link { publisher: publisher?, subscriber: subscriber?, offset, length })
-}
-
 /// Reads one `[[event]]`; `all` are the addresses of all slaves.
 fn event(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> Option<Event> {
     let s = &mut section;
@@ -523,21 +524,21 @@ fn event(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> 
         s.complain(reader, fault.help("for example: at = \"1 s\", or cycle = 500"));
     }
     let action = Kind::read(ACTIONS, "action", "do", s, reader)?;
-    let slaves = if action.about_slaves() { Some(targets(reader, s, all)) } else { None };
+    let slaves = if action.about_slaves() { Some(targets("event", reader, s, all)) } else { None };
     section.finish(reader);
     let when = at.map(When::Time).or(cycle.map(When::Cycle))?;
     Some(Event { when, slaves: slaves.unwrap_or_default(), action })
 }
 
 /// The slaves that an event is about.
-fn targets(reader: &mut Reader<'_>, section: &mut Section<'_>, all: &[Address]) -> Vec<Address> {
+pub(super) fn targets(noun: &str, reader: &mut Reader<'_>, section: &mut Section<'_>, all: &[Address]) -> Vec<Address> {
     let one = section.optional(reader, "slave", address);
     let many = section.optional(reader, "slaves", |node| match &node.value {
         Value::Text(text) if text.trim() == "all" => Ok(all.to_vec()),
         _ => address_list(node),
     });
     if section.has("slave") == section.has("slaves") {
-        let fault = Fault::new("this event needs either slave or slaves");
+        let fault = Fault::new(format!("this {noun} needs either slave or slaves"));
         section.complain(reader, fault.help("for example: slave = 3, slaves = \"3..10\", or slaves = \"all\""));
     }
     one.into_iter().chain(many.into_iter().flatten()).collect()

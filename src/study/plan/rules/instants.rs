@@ -51,7 +51,7 @@ pub(super) fn t_o_minimum(facts: &Facts<'_>, found: &mut Findings) {
         found.check(Key::slave(slave.address, "t_o"), t_o, Relation::MoreThan, ("T_DX + T_O_MIN", bound), || {
             Fault::new(format!("T_O = {t_o} is too early for slave {}", slave.address))
                 .rule(format!("T_O > T_DX + T_O_MIN = {t_dx} + {t_o_min} = {bound} (manual 3.3.6, Model: D3)"))
-                .help(format!("the earliest is t_o = \"{}\"", facts.plan.t_o_min(slave.device)))
+                .help(format!("the earliest is t_o = \"{}\"", facts.plan.t_o_min(&slave.device)))
         });
     }
 }
@@ -71,7 +71,7 @@ pub(super) fn t_o_maximum(facts: &Facts<'_>, found: &mut Findings) {
 fn too_late(facts: &Facts<'_>, slave: &Slave) -> Fault {
     let t_dp = facts.scenario.master.t_dp;
     let (times, gap_min) = (&slave.times, slave.device.gap_min(slave.functions));
-    let (min, max) = (facts.plan.t_o_min(slave.device), facts.plan.t_o_max(slave, t_dp));
+    let (min, max) = (facts.plan.t_o_min(&slave.device), facts.plan.t_o_max(slave, t_dp));
     let gap = t_dp - times.t_i - times.t_o;
     let message = if gap < Span::ZERO {
         format!("T_O = {} comes after the latch of slave {}", times.t_o, slave.address)
