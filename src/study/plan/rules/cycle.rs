@@ -141,7 +141,7 @@ pub(super) fn start_up(facts: &Facts<'_>, found: &mut Findings) {
     let needed = |slave| plan.start_up(facts.scenario, slave, build::set_prm(facts.scenario, slave).len());
     let longest = facts.slaves().map(|slave| (needed(slave), slave)).max_by_key(|&(needed, _)| needed);
     let Some((needed, slave)) = longest else { return };
-    let terms = format!("others, Set_Prm of slave {}, token, SYNCH", slave.address);
+    let terms = format!("others, start-up of slave {}, token, SYNCH", slave.address);
     found.check(T_DP, t_dp, Relation::AtLeast, (terms, Amount::from(needed)), || {
         Fault::new(format!("T_DP = {t_dp} leaves slave {} no time to start up", slave.address))
             .rule(format!(
