@@ -18,3 +18,4 @@ mod rig;
 mod scenarios;
 mod startup;
 mod support;
+mod topology;

@@ -665,15 +665,33 @@ dead time = T_I + T_MAPC x T_DP + T_O: latch, data in the next cycle, compute, s
     assert!(page.starts_with(expected), "\n{page}");
 }
 
-/// Of 122 slaves the page is no longer than of nine, and no line is wider than a wide terminal.
+/// Of a full segment the page is no longer than of a few slaves, and no line is wider than a wide terminal.
 #[test]
 fn a_page_of_many_slaves_fits() {
-    let many = THREE.replace("6..8", "3..124").replace("2 ms", "16 ms").replace("375 us", "12 ms");
+    let many = THREE.replace("6..8", "3..33").replace("2 ms", "16 ms").replace("375 us", "12 ms");
     for scenario in [THREE.to_owned(), many.clone(), many.replace("16 ms", "1 ms")] {
         let page = call(&Room::new(), &scenario, &[]).1;
         assert!(page.lines().count() <= 95, "{page}");
         assert!(page.lines().all(|line| line.chars().count() <= 140), "{page}");
     }
     let page = call(&Room::new(), &many, &[]).1;
-    assert!(page.contains("\n3..124  simodrive-sensor-isochron  143    200  231"), "{page}");
+    assert!(page.contains("\n3..33  simodrive-sensor-isochron  143    200  231"), "{page}");
+}
+
+/// A network of segments: repeaters are in the message cycles, and the proposal says where everything is.
+#[test]
+fn a_network_of_segments_is_planned_to_the_tick_and_proposed() {
+    let scenario = crate::support::scenario("repeaters", &[("run.duration", "500 ms"), ("run.seed", "3")]);
+    let run = Run::of(&scenario);
+    let plan = Plan::expected(&scenario);
+    let last = run.cycles.iter().rev().find_map(|row| row.t_dx).expect("a cycle");
+    // Without crystals that are off, the run is the plan.
+    assert_eq!(last, plan.t_dx);
+    assert!(plan.t_dx <= Plan::of(&scenario).t_dx);
+    let proposal = Proposal::of(&scenario).expect("times");
+    let text = proposal.text();
+    let read =
+        Scenario::parse("proposal", "proposal.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    assert_eq!(Plan::of(&read), Plan::of(&proposal.scenario), "{text}");
+    assert_eq!(read.topology, scenario.topology, "{text}");
 }

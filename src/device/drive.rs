@@ -10,8 +10,10 @@
 //! | LengthError | Active | LengthError | Lost, overdue |
 //!
 //! Only valid data are taken, and only those of active links are used; a link that is not active leaves what it brought
-//! last. A link that is overdue or has another length is told in the diagnosis until it is active again. Before the
-//! first data of a publisher a link is lost and not yet overdue: publishers start up one after the other (Model: D27).
+//! last. Model: D27 says "nothing valid"; a publisher that goes on sending another length stays a length error, which
+//! says more than lost. A link that is overdue or has another length is told in the diagnosis until it is active again.
+//! Before the first data of a publisher a link is lost and not yet overdue: publishers start up one after the other
+//! (Model: D27).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -37,6 +39,8 @@ pub type Drive = Unit<Subscriber>;
 pub struct Subscriber {
     own: Address,
     limits: DxbLimits,
+    /// Whether it takes user blocks besides its links.
+    user_blocks: bool,
     links: Links,
     /// How each link is, in the order of the links.
     conditions: Vec<Condition>,
@@ -92,6 +96,7 @@ impl Subscriber {
         Self {
             own,
             limits: profile.dxb,
+            user_blocks: false,
             links: Links::default(),
             conditions: Vec::new(),
             data: Vec::new(),
@@ -101,6 +106,13 @@ impl Subscriber {
             publishers: 0,
             revision: 0,
         }
+    }
+    /// The same, which takes blocks of user parameters besides its links, or does not. Model: what a manufacturer's user
+    /// parameters do is not known; they do nothing here.
+    #[must_use]
+    pub const fn with_user_blocks(mut self, user_blocks: bool) -> Self {
+        self.user_blocks = user_blocks;
+        self
     }
     /// What the link table brought, its samples one behind the other; zeros before the first.
     pub fn link_data(&self) -> &[u8] {
@@ -150,10 +162,10 @@ impl Subscriber {
 
 impl Function for Subscriber {
     fn check(&self, prm: &SetPrm<'_>) -> Result<(), Refusal> {
-        Links::of(prm, self.own, self.limits).map(|_| ())
+        Links::of(prm, self.own, self.limits, self.user_blocks).map(|_| ())
     }
     fn parameterise(&mut self, prm: &SetPrm<'_>, watchdog: Option<Span>) {
-        self.links = Links::of(prm, self.own, self.limits).unwrap_or_default();
+        self.links = Links::of(prm, self.own, self.limits, self.user_blocks).unwrap_or_default();
         self.conditions = vec![Condition::NEW; self.links.iter().len()];
         self.data = vec![0; self.links.octets()];
         self.publishers = self.links.iter().fold(0, |all, link| all | 1 << link.publisher.get());

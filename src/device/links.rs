@@ -56,12 +56,13 @@ struct Entry {
 }
 
 impl Links {
-    /// The links that `prm` asks of the subscriber at `own`, which has these limits.
+    /// The links that `prm` asks of the subscriber at `own`, which has these limits and takes user blocks besides, or
+    /// does not.
     ///
     /// # Errors
     /// The first rule that is broken, with its octet.
-    pub fn of(prm: &SetPrm<'_>, own: Address, limits: DxbLimits) -> Result<Self, Refusal> {
-        let entries = entries(prm, limits)?;
+    pub fn of(prm: &SetPrm<'_>, own: Address, limits: DxbLimits, user_blocks: bool) -> Result<Self, Refusal> {
+        let entries = entries(prm, limits, user_blocks)?;
         for (at, entry) in entries.iter().enumerate() {
             entry.check(own, limits)?;
             entry.check_with(&entries[..at])?;
@@ -134,13 +135,14 @@ impl Links {
 
 /// All entries of both tables in the order of the octets. Each table is there once at most, and nothing else but the
 /// isochronous block.
-fn entries(prm: &SetPrm<'_>, limits: DxbLimits) -> Result<Vec<Entry>, Refusal> {
+fn entries(prm: &SetPrm<'_>, limits: DxbLimits, user_blocks: bool) -> Result<Vec<Entry>, Refusal> {
     let mut all = Vec::new();
     let mut seen: [Option<BlockType>; 2] = [None; 2];
     for block in prm.blocks() {
         let block = block?;
         match block.kind {
             BlockType::IsoM => continue,
+            BlockType::User if user_blocks => continue,
             BlockType::DxbLinks | BlockType::DxbSubscriptions => {}
             kind => {
                 let rule = "this device takes isochronous, link table and subscriber table blocks only";
@@ -264,7 +266,7 @@ mod tests {
         built.octets().to_vec()
     }
     fn of(du: &[u8]) -> Result<Links, Refusal> {
-        Links::of(&SetPrm::parse(du).unwrap(), OWN, LIMITS)
+        Links::of(&SetPrm::parse(du).unwrap(), OWN, LIMITS, false)
     }
     /// Octet and value of the refusal.
     fn refused(du: &[u8]) -> (usize, u64) {
@@ -350,6 +352,8 @@ mod tests {
         let mut user = octets(&links[..1], &[], true);
         user.extend([4, 0x81, 0, 0]);
         assert_eq!(refused(&user), (21, 0x81));
+        let taken = Links::of(&SetPrm::parse(&user).unwrap(), OWN, LIMITS, true);
+        assert!(taken.is_ok_and(|links| links.iter().len() == 1), "a device that takes user blocks");
     }
 
     #[test]

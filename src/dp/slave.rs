@@ -225,7 +225,9 @@ impl Slave {
     }
     /// Which telegrams it wants.
     pub fn filter(&self, app: &impl Application) -> Filter {
-        Filter { all: false, own: self.identity.address, publishers: app.publishers() }
+        // Without parameters there are no links.
+        let listens = matches!(self.state, SlaveState::WaitCfg | SlaveState::DataExch);
+        Filter { all: false, own: self.identity.address, publishers: if listens { app.publishers() } else { 0 } }
     }
 
     /// The supply came on: everything from before is forgotten, initialisation takes no time.

@@ -14,6 +14,7 @@ pub const LINKS: usize = 8;
 pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     let mut lines = Vec::new();
     network(summary, &mut lines);
+    topology(summary, &mut lines);
     slaves(summary, &mut lines);
     leds(summary, &mut lines);
     spread(summary, &mut lines);
@@ -58,7 +59,15 @@ fn network(summary: &Summary, lines: &mut Vec<String>) {
     ];
     let text: Vec<_> = happened.iter().filter(|(count, _)| *count > 0).map(|&(n, what)| number(n, what)).collect();
     lines.push(if text.is_empty() { "nothing went wrong on the bus".to_owned() } else { text.join(", ") });
+}
+
+/// What is doubtful about the cables, and how they are joined if there is more than one.
+fn topology(summary: &Summary, lines: &mut Vec<String>) {
     lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
+    if !summary.topology.is_empty() {
+        lines.push(String::new());
+        lines.extend(summary.topology.iter().cloned());
+    }
 }
 
 fn slaves(summary: &Summary, lines: &mut Vec<String>) {

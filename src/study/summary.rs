@@ -16,6 +16,12 @@ use crate::wire::Address;
 pub struct Summary {
     /// The network and the run.
     pub network: Network,
+    /// Segments, links and stations as a drawing in text; empty for a network of one cable.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub topology: Vec<String>,
+    /// What a network like this should not have, but may.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// The bus cycle.
     pub timing: Timing,
     /// What happened how often.
@@ -39,9 +45,6 @@ pub struct Summary {
     pub events_left_out: u64,
     /// The files of the run.
     pub files: Vec<String>,
-    /// Rules that the network runs without, though it should keep them, a sentence each.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub warnings: Vec<String>,
 }
 
 /// What only the builder of a run knows.
@@ -340,10 +343,11 @@ impl Summary {
                 duration: counts.network.duration,
             },
             fingerprint: facts.fingerprint,
+            topology: Vec::new(),
+            warnings: Vec::new(),
             thinning: Vec::new(),
             events_left_out: 0,
             files: Vec::new(),
-            warnings: Vec::new(),
         }
     }
 

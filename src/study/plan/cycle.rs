@@ -2,8 +2,7 @@
 
 use crate::device::profile::Profile;
 use crate::fdl::params::BusParams;
-use crate::sim::bus::Place;
-use crate::study::scenario::{Bus, Scenario, Slave};
+use crate::study::scenario::{Scenario, Slave};
 use crate::time::{BitRate, Span, Tbit};
 use crate::wire::Address;
 
@@ -68,17 +67,16 @@ impl Plan {
     pub fn of(scenario: &Scenario) -> Self {
         let bus = &scenario.bus.params;
         Self::with(scenario, |slave| {
-            let t_td = Bus::propagation(slave.position_mm.abs_diff(scenario.master.position_mm));
+            let t_td = scenario.t_td(scenario.master.address, slave.address);
             (longest_tsdr(bus, slave, scenario.publishes(slave.address)), t_td * 2)
         })
     }
     /// The cycle as an undisturbed run with perfect crystals has it to the tick: every slave takes its own T_SDR, and
-    /// a cable delays as [`Place`] says.
+    /// cables and repeaters without jitter delay as [`Scenario::delay`] says.
     pub fn expected(scenario: &Scenario) -> Self {
         let bus = &scenario.bus.params;
-        let master = Place::at(scenario.master.position_mm);
         Self::with(scenario, |slave| {
-            let t_td = Place::at(slave.position_mm).delay(master);
+            let t_td = scenario.delay(scenario.master.address, slave.address);
             (slave.t_sdr.max(min_tsdr(bus, scenario.publishes(slave.address))), t_td * 2)
         })
     }

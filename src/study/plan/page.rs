@@ -45,13 +45,16 @@ fn head(facts: &Facts<'_>, lines: &mut Vec<String>) {
     let (scenario, plan) = (facts.scenario, &facts.plan);
     let bus = &scenario.bus.params;
     lines.push(format!(
-        "{}: master {}, {}, {}, {}, cable {} m",
+        "{}: master {}, {}, {}, {}, {}",
         scenario.name,
         scenario.master.address,
         number(plan.slots.len(), "slave"),
         number(scenario.links.len(), "link"),
         bus.rate,
-        scenario.bus.cable_mm as f64 / 1e3,
+        match scenario.topology.segments() {
+            [line] => format!("cable {} m", line.cable_mm as f64 / 1e3),
+            segments => number(segments.len(), "segment"),
+        },
     ));
     let shortest = scenario.configured().map(|slave| plan.t_dp_min(&slave.device)).max().unwrap_or_default();
     lines.push(format!(

@@ -11,6 +11,7 @@ use crate::sim::noise::GcJitter;
 use crate::study::build;
 use crate::study::quantity;
 use crate::study::report::ranges;
+use crate::study::scenario::topology::Topology;
 use crate::study::scenario::{CodeSequence, Crystal, Extent, Link, Sample, Scenario, Slave, Watchdog};
 use crate::time::{Span, Tbit};
 
@@ -72,6 +73,7 @@ impl Proposal {
     pub fn text(&self) -> String {
         let mut text = String::new();
         head(&mut text, self);
+        topology(&mut text, &self.scenario.topology);
         master(&mut text, &self.scenario);
         slaves(&mut text, &self.scenario);
         for link in &self.scenario.links {
@@ -193,7 +195,10 @@ fn head(text: &mut String, proposal: &Proposal) {
         Extent::Cycles(cycles) => writeln!(text, "cycles = {cycles}"),
     };
     let (bus, usual) = (&scenario.bus.params, BusParams::profile(scenario.bus.params.rate));
-    let _ = write!(text, "\n[bus]\nrate = \"{}\"\ncable = \"{} mm\"\n", bus.rate, scenario.bus.cable_mm);
+    let _ = write!(text, "\n[bus]\nrate = \"{}\"\n", bus.rate);
+    if !scenario.topology.has_segments() {
+        let _ = writeln!(text, "cable = \"{} mm\"", scenario.bus.cable_mm);
+    }
     for (key, value, usual) in [
         ("t_sl", bus.t_sl, usual.t_sl),
         ("min_tsdr", bus.min_tsdr, usual.min_tsdr),
@@ -215,9 +220,39 @@ fn head(text: &mut String, proposal: &Proposal) {
     }
 }
 
+/// The segments and what joins them; nothing for a single cable.
+fn topology(text: &mut String, topology: &Topology) {
+    if !topology.has_segments() {
+        return;
+    }
+    let segments = topology.segments();
+    for segment in segments {
+        let (name, cable, delay) = (&segment.name, segment.cable_mm, exact(segment.delay_per_metre));
+        let _ = write!(text, "\n[[segment]]\nname = {name:?}\ncable = \"{cable} mm\"\ndelay_per_metre = \"{delay}\"\n");
+    }
+    for repeater in topology.repeaters() {
+        let name = |end: usize| &segments[usize::from(repeater.ends[end].segment)].name;
+        let _ = write!(text, "\n[[repeater]]\nname = {:?}\nkind = \"{}\"\n", repeater.name, repeater.kind.name);
+        let _ = write!(text, "from = {:?}\nfrom_position = \"{} mm\"\n", name(0), repeater.ends[0].mm);
+        let _ = write!(text, "to = {:?}\nto_position = \"{} mm\"\n", name(1), repeater.ends[1].mm);
+        let _ = write!(text, "delay = \"{}\"\njitter = \"{}\"\n", exact(repeater.delay), exact(repeater.jitter));
+        if repeater.kind.name == "olm" {
+            let _ = write!(text, "modules = {}\nfibre = \"{} mm\"\n", repeater.modules, repeater.fibre_mm);
+        }
+    }
+}
+
+/// The segment of a station, where there are several.
+fn segment(text: &mut String, scenario: &Scenario, index: u8) {
+    if scenario.topology.has_segments() {
+        let _ = writeln!(text, "segment = {:?}", scenario.topology.segments()[usize::from(index)].name);
+    }
+}
+
 fn master(text: &mut String, scenario: &Scenario) {
     let master = &scenario.master;
     let _ = write!(text, "\n[master]\naddress = {}\nposition = \"{} mm\"\n", master.address, master.position_mm);
+    segment(text, scenario, master.segment);
     let _ = writeln!(text, "t_dp = \"{}\"", exact(master.t_dp));
     let _ = writeln!(text, "t_mapc = {}", master.t_mapc);
     if let Some(first) = scenario.configured().next() {
@@ -253,12 +288,14 @@ fn slaves(text: &mut String, scenario: &Scenario) {
     let Some(first) = scenario.configured().next() else { return };
     let inherited = times(first);
     let count = scenario.slaves.len() as u64;
-    let spread = |index: usize| scenario.bus.cable_mm * (index as u64 + 1) / count;
+    // On one cable slaves are spread evenly if nothing else is said; on segments the place is always said.
+    let line = !scenario.topology.has_segments();
+    let spread = |index: usize| line.then(|| scenario.bus.cable_mm * (index as u64 + 1) / count);
     let tables: Vec<_> = scenario
         .slaves
         .iter()
         .enumerate()
-        .map(|(index, slave)| (slave.address.get(), table(slave, &inherited, spread(index), &scenario.bus.params)))
+        .map(|(index, slave)| (slave.address.get(), table(slave, &inherited, spread(index), scenario)))
         .collect();
     for group in tables.chunk_by(|a, b| a.1 == b.1) {
         let addresses: Vec<u8> = group.iter().map(|(address, _)| *address).collect();
@@ -266,9 +303,11 @@ fn slaves(text: &mut String, scenario: &Scenario) {
     }
 }
 
-fn table(slave: &Slave, inherited: &[(&str, Span)], spread: u64, bus: &BusParams) -> String {
+fn table(slave: &Slave, inherited: &[(&str, Span)], spread: Option<u64>, scenario: &Scenario) -> String {
+    let bus = &scenario.bus.params;
     let mut text = format!("device = \"{}\"\n", slave.device.name);
-    if slave.position_mm != spread {
+    segment(&mut text, scenario, slave.segment);
+    if spread != Some(slave.position_mm) {
         let _ = writeln!(text, "position = \"{} mm\"", slave.position_mm);
     }
     if slave.crystal != Crystal::Offset(0) {

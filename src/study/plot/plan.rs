@@ -6,6 +6,7 @@ use super::telegrams::{Bar, Cycle, Kind};
 use super::{PlotError, PlotMeta};
 use crate::study::plan::{self, Plan};
 use crate::study::scenario::{Extent, Scenario};
+use crate::study::topology::Map;
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -45,6 +46,7 @@ fn meta(scenario: &Scenario) -> PlotMeta {
     let t_dp = scenario.master.t_dp;
     PlotMeta {
         scenario: scenario.name.clone(),
+        topology: Map::of(scenario),
         seed: scenario.run.seed,
         t_dp,
         slaves: scenario.configured().map(|slave| slave.address).collect(),

@@ -5,6 +5,7 @@ use super::class2;
 use super::error::{Fault, Problem};
 use super::section::Reader;
 use super::services;
+use super::topology;
 use super::tree::Place;
 use super::{Action, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Sample, Scenario, Slave, When};
 use crate::device::options::Resolution;
@@ -42,8 +43,8 @@ impl Stage {
 
 /// All rules in stages. A stage takes for granted that the stages before found nothing.
 static STAGES: &[Stage] = &[
-    Stage::own(&[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length]),
-    Stage::own(&[class2::own_addresses, class2::positions, class2::slaves]),
+    Stage::own(&[some_slave, own_addresses, addresses_within_hsa, wiring, crystals, run_length]),
+    Stage::own(&[class2::slaves]),
     Stage { own: &[], planned: &[rules::BUS] },
     Stage { own: &[], planned: &[rules::CYCLE] },
     Stage { own: &[services::sync_and_freeze], planned: &[rules::SERVICES] },
@@ -119,50 +120,45 @@ fn some_slave(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn own_addresses(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let master = facts.scenario.master.address;
-    if facts.scenario.slave(master).is_some() {
-        let fault = Fault::new(format!("the master and a slave have the address {master}"))
-            .rule("every station of a bus has an address of its own (EN 50170-2)");
-        about(reader, &format!("slave.{master}.address"), &[], fault);
+    // Of slaves the table is known by the address, so that two of them are found when they are read.
+    let all: Vec<_> = facts.scenario.stations().collect();
+    for (i, station) in all.iter().enumerate() {
+        if let Some(other) = all[..i].iter().find(|other| other.address == station.address) {
+            let (a, b) = (other.what_it_is(), station.what_it_is());
+            let fault = Fault::new(format!("{a} and {b} have the address {}", station.address))
+                .rule("every station of a bus has an address of its own (EN 50170-2)");
+            about(reader, &format!("{}.address", station.path()), &[], fault);
+        }
     }
 }
 
 fn addresses_within_hsa(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let hsa = facts.scenario.bus.params.hsa;
-    let master = facts.scenario.master.address;
-    let slaves = facts.scenario.slaves.iter().map(|s| (s.address, format!("slave.{}.address", s.address)));
-    for (address, key) in slaves.chain([(master, "master.address".to_owned())]) {
+    for station in facts.scenario.stations() {
+        let address = station.address;
         if address.get() > hsa {
             let fault = Fault::new(format!("the address {address} is above hsa = {hsa}"))
                 .rule("no station is above the highest station address HSA (EN 50170-2)")
                 .help(format!("hsa = {address} or more, at most 126"));
-            about(reader, &key, &[], fault);
+            about(reader, &format!("{}.address", station.path()), &[], fault);
         }
     }
 }
 
-fn positions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let cable = facts.scenario.bus.cable_mm;
-    let slaves = facts.scenario.slaves.iter().map(|s| (s.position_mm, format!("slave.{}.position", s.address)));
-    for (mm, key) in slaves.chain([(facts.scenario.master.position_mm, "master.position".to_owned())]) {
-        if mm > cable {
-            let fault = Fault::new(format!("{} is beyond the end of the cable", metres(mm)))
-                .rule(format!("a station is 0 m to {} along the cable (Model: one line)", metres(cable)))
-                .help(format!("for example under [bus]: cable = \"{}\"", metres(mm)));
-            about(reader, &key, &[], fault);
-        }
-    }
+fn wiring(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    topology::positions(facts.scenario, reader);
+    topology::loads(facts.scenario, reader);
+    topology::jitter(facts.scenario, reader);
 }
 
 fn crystals(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let slaves = facts.scenario.slaves.iter().map(|s| (s.crystal, format!("slave.{}.crystal", s.address)));
-    for (crystal, key) in slaves.chain([(facts.scenario.master.crystal, "master.crystal".to_owned())]) {
-        let (Crystal::Offset(ppb) | Crystal::Within(ppb)) = crystal;
+    for station in facts.scenario.stations() {
+        let (Crystal::Offset(ppb) | Crystal::Within(ppb)) = station.crystal;
         if ppb.abs() > CRYSTAL_MAX_PPB {
             let fault = Fault::new(format!("a crystal is not off by {} ppm", ppb as f64 / 1e3))
                 .rule("a crystal is within 200 ppm (Model: twice what cheap ones have)")
                 .help(format!("\"{} ppm\" at most", ppb.signum() * CRYSTAL_MAX_PPB / 1_000));
-            about(reader, &key, &[], fault);
+            about(reader, &format!("{}.crystal", station.path()), &[], fault);
         }
     }
 }
@@ -444,7 +440,7 @@ fn link_counts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
         let mut own = all.iter().filter(|(_, link, _)| link.subscriber == slave.address);
         if let Some((path, ..)) = own.nth(most) {
             let fault = Fault::new(format!("slave {} has more than {most} links", slave.address))
-                .rule(format!("a subscriber has up to {most} links, each sample is one (DXB_Max_Link_Count)"));
+                .rule(format!("a subscriber has up to {most} links (GSD: DXB_Max_Link_Count), each sample is one"));
             about(reader, &format!("link.{}.subscriber", number_of(path)), &[], fault);
         }
     }
@@ -504,13 +500,5 @@ impl Action {
     /// Whether an event with this action names slaves.
     pub(super) const fn about_slaves(self) -> bool {
         !matches!(self, Self::Clear | Self::Operate | Self::Control(_))
-    }
-}
-
-/// A length as people write it.
-fn metres(mm: u64) -> String {
-    match mm % 1_000 {
-        0 => format!("{} m", mm / 1_000),
-        _ => format!("{mm} mm"),
     }
 }

@@ -2,14 +2,18 @@
 
 use super::{Facts, Findings};
 use crate::study::plan::finding::{Amount, Key, Relation};
-use crate::study::scenario::{Bus, Fault};
+use crate::study::scenario::Fault;
 use crate::time::Tbit;
 
 pub(super) fn parameters(facts: &Facts<'_>, found: &mut Findings) {
     let bus = &facts.scenario.bus;
     // The first one that is broken explains the others.
     let mut told = false;
-    for rule in bus.params.rules(Bus::propagation(bus.cable_mm)) {
+    let topology = &facts.scenario.topology;
+    let t_td = topology.t_td_max();
+    // A line's delay is its cable's; that of segments is not to be seen in the file.
+    let path = if topology.has_segments() { format!(", T_TD = {t_td} on the longest path") } else { String::new() };
+    for rule in bus.params.rules(t_td) {
         let in_bits = !matches!(rule.name, "max_retry_limit" | "gap_factor" | "hsa");
         let amount = |number: u32| if in_bits { Amount::Bits(number.into()) } else { Amount::Count(number.into()) };
         let key = Key::bus(rule.name);
@@ -19,7 +23,7 @@ pub(super) fn parameters(facts: &Facts<'_>, found: &mut Findings) {
             "no value fits with the other bus parameters and the cable: change those".to_owned()
         };
         let fault = Fault::new(format!("{} is not allowed here", rule.value))
-            .rule(format!("{} (EN 50170-2)", rule.rule))
+            .rule(format!("{} (EN 50170-2){path}", rule.rule))
             .help(help);
         for (relation, bound) in [(Relation::AtLeast, rule.min), (Relation::AtMost, rule.max)] {
             found.silent(key, amount(rule.value), relation, (rule.rule, amount(bound)));
