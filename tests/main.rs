@@ -16,6 +16,7 @@ mod layers;
 mod live_list;
 mod manual;
 mod options;
+mod plan;
 mod props;
 mod rig;
 mod scenarios;

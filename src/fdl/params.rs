@@ -43,6 +43,12 @@ pub struct ParamRule {
     /// The rule in words.
     pub rule: &'static str,
 }
+impl ParamRule {
+    /// Whether the value is allowed by the others.
+    pub fn holds(&self) -> bool {
+        (self.min..=self.max).contains(&self.value)
+    }
+}
 impl fmt::Display for ParamRule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} = {} breaks {} (allowed here: {}..={})", self.name, self.value, self.rule, self.min, self.max)
@@ -111,16 +117,13 @@ impl BusParams {
         self.rate.span(bits)
     }
 
-    /// Checks every rule between the parameters for a bus with a longest one-way delay of `t_td`.
-    ///
-    /// # Errors
-    /// The first rule that does not hold, with its numbers.
-    pub fn check(&self, t_td: Span) -> Result<(), ParamRule> {
+    /// Every rule between the parameters for a bus with a longest one-way delay of `t_td`, with its numbers.
+    pub fn rules(&self, t_td: Span) -> [ParamRule; 9] {
         let t_td = t_td.ceil_to(self.rate.bit()).div_floor(self.rate.bit()) as u32;
         let idle = 35 + 2 * self.t_set.0 + self.t_qui.0;
         let slot = (2 * t_td + self.max_tsdr.0).max(2 * t_td + self.t_id1().0) + 11 + self.t_sm().0;
         let min_tsdr_max = 255.min(self.max_tsdr.0.saturating_sub(1)).min(idle - 1);
-        let rules = [
+        [
             ("t_set", self.t_set.0, 1, 494, "1 <= T_SET <= 494"),
             ("t_qui", self.t_qui.0, 0, 31.min(self.min_tsdr.0.saturating_sub(1)), "T_QUI <= min(31, min T_SDR - 1)"),
             ("max_tsdr", self.max_tsdr.0, idle, 1023, "35 + 2 T_SET + T_QUI <= max T_SDR <= 1023"),
@@ -136,13 +139,18 @@ impl BusParams {
             ("gap_factor", u32::from(self.gap_factor), 1, 100, "1 <= G <= 100"),
             ("hsa", u32::from(self.hsa), 1, 126, "HSA <= 126"),
             ("t_tr", self.t_tr.0, 256, 16_777_960, "256 <= T_TR <= 16 777 960"),
-        ];
-        for (name, value, min, max, rule) in rules {
-            if !(min..=max).contains(&value) {
-                return Err(ParamRule { name, value, min, max, rule });
-            }
+        ]
+        .map(|(name, value, min, max, rule)| ParamRule { name, value, min, max, rule })
+    }
+    /// Checks every rule between the parameters for a bus with a longest one-way delay of `t_td`.
+    ///
+    /// # Errors
+    /// The first rule that does not hold, with its numbers.
+    pub fn check(&self, t_td: Span) -> Result<(), ParamRule> {
+        match self.rules(t_td).into_iter().find(|rule| !rule.holds()) {
+            Some(broken) => Err(broken),
+            None => Ok(()),
         }
-        Ok(())
     }
 }
 

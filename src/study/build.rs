@@ -20,7 +20,7 @@ use crate::sim::network::{self, Act, Network, NetworkEvent, Site, Wiring};
 use crate::sim::noise::{JitterSource, LinkJitter, Purpose, Stream};
 use crate::sim::queue::Queue;
 use crate::sim::topology::Place;
-use crate::study::plan::Plan;
+use crate::study::plan::{self, Plan};
 use crate::study::scenario::{self, Action, CodeSequence, Scenario, Slave, When};
 use crate::time::{Local, Span, Time};
 use crate::wire::Address;
@@ -43,7 +43,7 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
     let bus = &scenario.bus.params;
     let publisher = scenario.publishes(slave.address);
     // A publisher's listeners need the time of an idle line (Model: D27).
-    let min_tsdr = if publisher { bus.t_id1() } else { bus.min_tsdr };
+    let min_tsdr = plan::min_tsdr(bus, publisher);
     let watchdog = scenario.master.watchdog;
     let services = slave.services;
     let prm = SetPrm {
@@ -53,7 +53,7 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
             .with(StationStatus::WD_ON, watchdog.is_some()),
         wd_fact_1: watchdog.map_or(1, |watchdog| watchdog.factor_1),
         wd_fact_2: watchdog.map_or(1, |watchdog| watchdog.factor_2),
-        min_tsdr: min_tsdr.0 as u8,
+        min_tsdr: min_tsdr.0.min(u8::MAX.into()) as u8,
         ident: slave.device.ident,
         group: CLOCK_GROUP | services.groups,
         dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::ISOM_REQ | DpV1Status::PRM_STRUCTURE)
@@ -106,18 +106,20 @@ fn user_block(slave: &Slave) -> UserPrm81 {
 fn iso_block(scenario: &Scenario, slave: &Slave) -> IsoM {
     let device = &slave.device;
     let units = |span: Span| (span.ticks() / Span::TICKS_PER_ISO_UNIT) as u32;
+    // Only a network to plan has longer ones.
+    let short = |units: u32| units.min(u16::MAX.into()) as u16;
     let t_dx = Plan::of(scenario).t_dx_told();
     IsoM {
         version: 1,
         t_base_dp: device.t_base_dp,
-        t_dp: (units(scenario.master.t_dp) / device.t_base_dp) as u16,
+        t_dp: short(units(scenario.master.t_dp) / device.t_base_dp),
         t_mapc: scenario.master.t_mapc,
         t_base_io: device.t_base_io,
-        t_i: (units(slave.times.t_i) / device.t_base_io) as u16,
-        t_o: (units(slave.times.t_o) / device.t_base_io) as u16,
+        t_i: short(units(slave.times.t_i) / device.t_base_io),
+        t_o: short(units(slave.times.t_o) / device.t_base_io),
         t_dx: units(t_dx),
-        t_pll_w: units(slave.times.t_pll_w) as u16,
-        t_pll_d: units(slave.times.t_pll_d) as u16,
+        t_pll_w: short(units(slave.times.t_pll_w)),
+        t_pll_d: short(units(slave.times.t_pll_d)),
     }
 }
 

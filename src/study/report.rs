@@ -319,7 +319,7 @@ fn range(low: Option<Span>, high: Option<Span>) -> String {
     if low == high { low } else { format!("{low} to {high}") }
 }
 /// `1 slave`, `2 slaves`, `3 retries`.
-fn number(count: impl TryInto<u64>, noun: &str) -> String {
+pub(super) fn number(count: impl TryInto<u64>, noun: &str) -> String {
     let count = count.try_into().unwrap_or(u64::MAX);
     match noun.strip_suffix('y') {
         _ if count == 1 => format!("1 {noun}"),
@@ -418,6 +418,13 @@ fingerprint: wire 0123456789abcdef
         let text = render(&summary, None);
         assert!(text.contains("\nlive list: 2 stations, lost 0, syncs 1, repeats 0,"), "{text}");
         assert!(!text.contains("worst state"), "{text}");
+    }
+
+    #[test]
+    fn warnings_are_told_where_the_bus_is() {
+        let mut summary = sample::run();
+        summary.warnings = vec!["too slow".to_owned()];
+        assert!(render(&summary, None).contains("\n1 fault, 2 retries\nwarning: too slow\n\nslave"));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
+use super::plan::rules;
 use super::plot::{BusCycle, Distribution, Distributions, LinkLatencies, PlotError, PlotMeta, Plots};
 use super::row::Sink;
 use super::scenario::{Extent, Scenario};
@@ -182,7 +183,7 @@ fn conclude(
     if scenario.topology.has_segments() {
         summary.topology = map.text(false);
     }
-    summary.warnings = scenario.warnings();
+    summary.warnings = [scenario.warnings(), rules::warnings(scenario)].concat();
 
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {

@@ -22,6 +22,7 @@ mod station;
 pub mod topology;
 mod tree;
 
+use check::Check;
 pub use class2::{Class2, Class2Job};
 pub use error::{Fault, Position, Problem, ScenarioError};
 pub use link::{Link, Sample, Table};
@@ -76,6 +77,22 @@ pub struct Scenario {
     pub record: Record,
 }
 
+/// Where the text of a scenario comes from.
+struct Origin<'a> {
+    /// The directory in which GSD files are looked for.
+    dir: &'a Path,
+    /// The scenario's name.
+    name: &'a str,
+    /// What messages call it.
+    source: &'a str,
+}
+
+impl<'a> Origin<'a> {
+    fn of_text(name: &'a str, source: &'a str) -> Self {
+        Self { dir: Path::new(source).parent().unwrap_or(Path::new("")), name, source }
+    }
+}
+
 impl Scenario {
     /// Longest scenario file (octets).
     pub const MAX_FILE: u64 = 4 << 20;
@@ -87,12 +104,23 @@ impl Scenario {
     /// # Errors
     /// The file cannot be read, is no text, too long or empty, or [`Self::parse`] finds something wrong.
     pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        Self::open(path, overrides, Check::All)
+    }
+    /// As [`Self::load`], but the rules of [`plan::rules`](crate::study::plan::rules) may be broken: a network to plan.
+    ///
+    /// # Errors
+    /// As [`Self::load`] for everything else.
+    pub fn load_to_plan(path: &Path, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        Self::open(path, overrides, Check::ToPlan)
+    }
+    fn open(path: &Path, overrides: &[(String, String)], check: Check) -> Result<Self, ScenarioError> {
         let source = path.display().to_string();
         let octets = read_file(path, "scenario", "name one scenario file in it, *.toml")
             .map_err(|fault| ScenarioError::about_file(&source, fault))?;
         let text = decode(&octets).map_err(|fault| ScenarioError::about_file(&source, fault))?;
         let name = name_of(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
-        Self::parse_in(path.parent().unwrap_or(Path::new("")), &name, &source, text, overrides)
+        let dir = path.parent().unwrap_or(Path::new(""));
+        Self::read(&Origin { dir, name: &name, source: &source }, text, overrides, check)
     }
 
     /// Reads `text` as the scenario `name`; messages call it `source`, and GSD files are looked for beside it.
@@ -101,18 +129,27 @@ impl Scenario {
     /// # Errors
     /// The text is no TOML, a key is unknown, missing or wrong, or a rule of the bus or of a device is broken.
     pub fn parse(name: &str, source: &str, text: &str, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
-        let dir = Path::new(source).parent().unwrap_or(Path::new(""));
-        Self::parse_in(dir, name, source, text, overrides)
+        Self::read(&Origin::of_text(name, source), text, overrides, Check::All)
     }
-
-    /// As [`Self::parse`] with the directory in which GSD files are looked for.
-    fn parse_in(
-        dir: &Path,
+    /// As [`Self::parse`], but the rules of [`plan::rules`](crate::study::plan::rules) may be broken: a network to plan.
+    ///
+    /// # Errors
+    /// As [`Self::parse`] for everything else.
+    pub fn parse_to_plan(
         name: &str,
         source: &str,
         text: &str,
         overrides: &[(String, String)],
     ) -> Result<Self, ScenarioError> {
+        Self::read(&Origin::of_text(name, source), text, overrides, Check::ToPlan)
+    }
+    fn read(
+        origin: &Origin<'_>,
+        text: &str,
+        overrides: &[(String, String)],
+        check: Check,
+    ) -> Result<Self, ScenarioError> {
+        let &Origin { dir, name, source } = origin;
         if text.trim().is_empty() {
             let fault = Fault::new("the scenario is empty").help("it needs [run], [bus], [master] and a [[slave]]");
             return Err(ScenarioError::about_file(source, fault));
@@ -123,7 +160,7 @@ impl Scenario {
         let read = read::scenario(&mut reader, root);
         let mut problems = reader.take_problems();
         if let Some(mut scenario) = read.filter(|_| problems.is_empty()) {
-            problems = check::check(&scenario, &mut reader);
+            problems = check::check(&scenario, &mut reader, check);
             if problems.is_empty() {
                 name.clone_into(&mut scenario.name);
                 scenario.question = question(text);

@@ -16,6 +16,7 @@ mod distribution;
 mod lanes;
 mod latch_skew;
 mod look;
+pub mod plan;
 mod pll_convergence;
 mod position;
 mod publish_latency;

@@ -356,27 +356,32 @@ fn shape_box(node: roxmltree::Node<'_, '_>) -> Option<Box4> {
     })
 }
 
+/// Everything of a picture is inside of it, and no two texts meet.
+pub(super) fn all_inside_and_apart(name: &str, text: &str) {
+    let document = roxmltree::Document::parse(text).unwrap();
+    let height = number(document.root_element(), "height");
+    let mut texts: Vec<(Box4, String)> = Vec::new();
+    for node in document.descendants().filter(roxmltree::Node::is_element) {
+        let Some(found) = shape_box(node) else { continue };
+        let inside = found.0 >= 0.0 && found.1 >= 0.0 && found.2 <= f64::from(WIDTH) && found.3 <= height;
+        assert!(inside, "{name}: {node:?} {:?} at {found:?} is outside", node.text());
+        if node.has_tag_name("text") {
+            texts.push((found, node.text().unwrap_or("").trim().to_owned()));
+        }
+    }
+    for (index, (a, first)) in texts.iter().enumerate() {
+        for (b, second) in &texts[index + 1..] {
+            let apart = a.2 <= b.0 || b.2 <= a.0 || a.3 <= b.1 || b.3 <= a.1;
+            assert!(apart, "{name}: '{first}' {a:?} meets '{second}' {b:?}");
+        }
+    }
+}
+
 #[test]
 fn everything_is_inside_and_no_two_texts_meet() {
     for (name, world) in worlds() {
         for (file, text) in world.pictures() {
-            let document = roxmltree::Document::parse(&text).unwrap();
-            let height = number(document.root_element(), "height");
-            let mut texts: Vec<(Box4, String)> = Vec::new();
-            for node in document.descendants().filter(roxmltree::Node::is_element) {
-                let Some(found) = shape_box(node) else { continue };
-                let inside = found.0 >= 0.0 && found.1 >= 0.0 && found.2 <= f64::from(WIDTH) && found.3 <= height;
-                assert!(inside, "{name} {file}: {node:?} {:?} at {found:?} is outside", node.text());
-                if node.has_tag_name("text") {
-                    texts.push((found, node.text().unwrap_or("").trim().to_owned()));
-                }
-            }
-            for (index, (a, first)) in texts.iter().enumerate() {
-                for (b, second) in &texts[index + 1..] {
-                    let apart = a.2 <= b.0 || b.2 <= a.0 || a.3 <= b.1 || b.3 <= a.1;
-                    assert!(apart, "{name} {file}: '{first}' {a:?} meets '{second}' {b:?}");
-                }
-            }
+            all_inside_and_apart(&format!("{name} {file}"), &text);
         }
     }
 }
@@ -466,7 +471,8 @@ fn the_kept_bus_cycle_has_a_gap_poll_if_one_was_complete() {
 
 #[test]
 fn every_file_of_this_folder_is_registered_or_serves_the_others() {
-    const SERVING: [&str; 8] = ["mod", "buckets", "chart", "distribution", "lanes", "look", "telegrams", "tests"];
+    const SERVING: [&str; 9] =
+        ["mod", "plan", "buckets", "chart", "distribution", "lanes", "look", "telegrams", "tests"];
     let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/study/plot");
     let stem = |path: &Path| path.file_stem().unwrap().to_string_lossy().into_owned();
     let files: BTreeSet<String> = std::fs::read_dir(dir).unwrap().map(|entry| stem(&entry.unwrap().path())).collect();

@@ -276,11 +276,11 @@ fn bus_parameters_that_break_a_rule() {
             "12 Mbit/s",
             "500 kbit/s",
             r#"
-good.toml:9:8: bus.rate: 500 kbit/s is too slow for isochronous mode
-  9 | rate = "500 kbit/s"
-    |        ^^^^^^^^^^^^
-  rule: isochronous mode is offered from 1.5 Mbit/s on (SIMODRIVE 611 universal manual)
-  help: "1.5 Mbit/s", "3 Mbit/s", "6 Mbit/s" or "12 Mbit/s"
+good.toml:14:8: master.t_dp: T_DP = 4 ms cannot hold the cycle of 4 slaves
+  14 | t_dp = "4 ms"
+     |        ^^^^^^
+  rule: T_DP >= T_DX 4.216 ms + GAP 606 us + token 140 us + Global_Control 360 us = 5.322 ms (manual 3.3.2)
+  help: the shortest is t_dp = "5.375 ms"
 "#,
         ),
         (
@@ -290,6 +290,17 @@ good.toml:9:8: bus.rate: 500 kbit/s is too slow for isochronous mode
 good.toml:9:8: bus.rate: "10 Mbit/s" is not a bit rate of PROFIBUS DP; the nearest is "12 Mbit/s"
   9 | rate = "10 Mbit/s"
     |        ^^^^^^^^^^^
+"#,
+        ),
+        (
+            "12 Mbit/s",
+            "12 Mbit/s\"\nt_sl = \"1200 tbit\"\nt_set = \"120 tbit",
+            r#"
+good.toml:11:9: bus.t_set: T_ID1 = 284 tbit is more than publisher 3 can be told
+  11 | t_set = "120 tbit"
+     |         ^^^^^^^^^^
+  rule: a publisher's min_TSDR is T_ID1 = 35 + 2 T_SET + T_QUI, at most 255 (Set_Prm octet 4, Model: D27)
+  help: t_set = "105 tbit" or less, or no links
 "#,
         ),
         (

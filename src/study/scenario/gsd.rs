@@ -200,9 +200,9 @@ impl Chosen {
 pub(super) fn device_rates(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let rate = facts.scenario.bus.params.rate;
     for slave in facts.scenario.configured().filter(|slave| !slave.device.works_at(rate)) {
-        let all = BitRate::ALL.iter().filter(|&&rate| rate >= BitRate::M1_5 && slave.device.works_at(rate));
+        let all = BitRate::ALL.iter().filter(|&&rate| slave.device.works_at(rate));
         let fault = Fault::new(format!("slave {} does not work at {rate}", slave.address))
-            .rule(format!("bit rates of {} (its GSD file)", slave.device.name))
+            .rule(format!("bit rates of {} (its profile or GSD file)", slave.device.name))
             .help(all.map(|rate| format!("\"{rate}\"")).collect::<Vec<_>>().join(", "));
         about(reader, "bus.rate", &[], fault);
     }

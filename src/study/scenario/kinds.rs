@@ -273,7 +273,7 @@ pub(super) fn address(node: &Node) -> Result<Address, Fault> {
 }
 
 /// The largest stray of `jitter`, if it has a bound.
-pub(super) const fn jitter_bound(jitter: GcJitter) -> Option<Span> {
+pub(in crate::study) const fn jitter_bound(jitter: GcJitter) -> Option<Span> {
     match jitter {
         GcJitter::None => Some(Span::ZERO),
         GcJitter::Uniform { half_width } => Some(half_width),

@@ -38,10 +38,6 @@ impl Slave {
     }
 }
 
-/// Shortest Data_Control_Time in cycles. Model: D5, its third is two cycles or more, since not every cycle has time to
-/// tell the mode.
-const LEAST_CONTROL_CYCLES: i64 = 6;
-
 /// Reads the keys of `[master]`.
 pub(super) fn master(section: &mut Section<'_>, reader: &mut Reader<'_>) -> MasterServices {
     let auto_clear = section.optional(reader, "auto_clear", yes).unwrap_or(false);
@@ -90,38 +86,6 @@ pub(super) fn sync_and_freeze(facts: &Facts<'_>, reader: &mut Reader<'_>) {
                 about_slave(reader, slave, key, fault);
             }
         }
-    }
-}
-
-/// No slave is asked faster than it may be.
-pub(super) fn slave_interval(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let t_dp = facts.scenario.master.t_dp;
-    for slave in facts.scenario.configured() {
-        let least = slave.min_slave_interval();
-        if t_dp < least {
-            let fault = Fault::new(format!("T_DP = {t_dp} is too short for slave {}", slave.address))
-                .rule(format!(
-                    "T_DP >= Min_Slave_Interval = {least} of every slave (GSD, Min_Slave_Intervall in 100 us)"
-                ))
-                .help(format!("the shortest is t_dp = \"{}\"", least.ceil_to(slave.device.dp_grid())));
-            let own = format!("slave.{}.min_slave_interval", slave.address);
-            about(reader, &own, &["master.t_dp"], fault);
-        }
-    }
-}
-
-/// The mode can be told often enough.
-pub(super) fn data_control_time(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let master = &facts.scenario.master;
-    let least = master.t_dp * LEAST_CONTROL_CYCLES;
-    if let Some(time) = master.services.data_control_time.filter(|&time| time < least) {
-        let fault = Fault::new(format!("a Data_Control_Time of {time} is too short"))
-            .rule(format!(
-                "Data_Control_Time >= {LEAST_CONTROL_CYCLES} x T_DP = {least}: the mode is told every third of it, and \
-                 not in every cycle (Model: D5)"
-            ))
-            .help(format!("data_control_time = \"{least}\" or more"));
-        about(reader, "master.data_control_time", &[], fault);
     }
 }
 
