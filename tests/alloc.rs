@@ -20,7 +20,10 @@ const START: u64 = 1_000;
 const WATCHED: u64 = 1_000;
 
 fn reference(sets: &[(&str, &str)]) -> Scenario {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/reference.toml");
+    shipped("reference", sets)
+}
+fn shipped(name: &str, sets: &[(&str, &str)]) -> Scenario {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name).with_extension("toml");
     let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
     Scenario::load(&path, &sets).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -61,4 +64,11 @@ fn a_fault_and_its_acknowledgement_allocate_nothing() {
            [[disturbance]]\nkind = \"lost-telegrams\"\nfrom = 4\nfrom_cycle = 300\nevery = 50\n";
     let disturbed = Scenario::parse(&scenario.name, "disturbed", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
+}
+
+#[test]
+fn a_token_that_goes_round_allocates_nothing() {
+    for set in [("bus.gap_factor", "20"), ("bus.gap_factor", "1"), ("bus.t_tr", "300000 tbit")] {
+        assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("two-masters", &[set])), 0, "{set:?}");
+    }
 }

@@ -13,6 +13,7 @@ mod manual;
 mod options;
 mod props;
 mod rig;
+mod ring;
 mod scenarios;
 mod startup;
 mod support;

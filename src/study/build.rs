@@ -18,7 +18,7 @@ use crate::sim::network::{self, Act, Network, NetworkEvent, Site};
 use crate::sim::noise::{JitterSource, Purpose, Stream};
 use crate::sim::queue::Queue;
 use crate::study::plan::Plan;
-use crate::study::scenario::{self, Action, CodeSequence, Scenario, Slave, When};
+use crate::study::scenario::{self, Action, Class1, CodeSequence, Scenario, Slave, When};
 use crate::time::{Local, Span, Time};
 use crate::wire::Address;
 use crate::wire::drive::G1Stw;
@@ -39,7 +39,9 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
     let publisher = scenario.publishes(slave.address);
     // A publisher's listeners need the time of an idle line (Model: D27).
     let min_tsdr = if publisher { bus.t_id1() } else { bus.min_tsdr };
-    let watchdog = scenario.master.watchdog;
+    let owner = scenario.class1(slave.master);
+    let watchdog = owner.map_or(scenario.master.watchdog, |class1| class1.watchdog);
+    let clocked = scenario.is_clocked(slave);
     let services = slave.services;
     let prm = SetPrm {
         status: (StationStatus::LOCK)
@@ -50,15 +52,16 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
         wd_fact_2: watchdog.map_or(1, |watchdog| watchdog.factor_2),
         min_tsdr: min_tsdr.0 as u8,
         ident: slave.device.ident,
-        group: CLOCK_GROUP | services.groups,
-        dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::ISOM_REQ | DpV1Status::PRM_STRUCTURE)
+        group: if clocked { CLOCK_GROUP } else { 0 } | services.groups,
+        dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::PRM_STRUCTURE)
+            .with(DpV1Status::ISOM_REQ, clocked)
             .with(DpV1Status::FAIL_SAFE, slave.device.fail_safe)
             .with(DpV1Status::PUBLISHER_ENABLE, publisher),
         blocks: &[],
     };
     let builder = PrmBuilder::new(&prm).and_then(|builder| {
         let builder = if slave.device.subscriber { Some(builder) } else { builder.user_81(&user_block(slave)) }?;
-        let builder = builder.iso_m(&iso_block(scenario, slave))?;
+        let builder = if clocked { builder.iso_m(&iso_block(scenario, slave))? } else { builder };
         let links = links_to(scenario, slave.address);
         if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }
     });
@@ -124,7 +127,7 @@ pub fn slave_params(scenario: &Scenario, slave: &Slave) -> SlaveParams {
         inputs: slave.device.inputs,
         publisher: scenario.publishes(slave.address),
         fail_safe: slave.device.fail_safe,
-        get_cfg: scenario.master.get_cfg,
+        get_cfg: scenario.class1(slave.master).map_or(scenario.master.get_cfg, |class1| class1.get_cfg),
         max_diag: slave.device.max_diag,
         min_interval: slave.min_slave_interval(),
     }
@@ -142,8 +145,15 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
         place: Place::at(master.position_mm),
         crystal: crystal(seed, master.address, master.crystal),
         shaft: None,
-        powered_at: Time::ZERO,
+        powered_at: Time::ZERO + master.powered_at,
     }];
+    sites.extend(scenario.class1.iter().map(|class1| Site {
+        machine: Node::Master(further_master(scenario, class1)),
+        place: Place::at(class1.position_mm),
+        crystal: crystal(seed, class1.address, class1.crystal),
+        shaft: None,
+        powered_at: Time::ZERO + class1.powered_at,
+    }));
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
     let mut network = Network::new(scenario.bus.params.rate, sites, jitter, scenario.disturbances.clone());
@@ -152,7 +162,7 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
             When::Time(span) => network::When::Time(Time::ZERO + span),
             When::Cycle(cycle) => network::When::Cycle(cycle),
         };
-        for &(station, act) in &acts(master.address, &event.slaves, event.action) {
+        for &(station, act) in &acts(scenario, &event.slaves, event.action) {
             network.order(when, station, act);
         }
     }
@@ -162,13 +172,13 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
 fn master_of(scenario: &Scenario) -> Master<Controller> {
     let master = &scenario.master;
     // A station that is no slave to the master is not in its list.
-    let slaves: Vec<&Slave> = scenario.slaves.iter().filter(|slave| !slave.silent).collect();
+    let slaves: Vec<&Slave> = scenario.configured().collect();
     let settings = Settings {
         address: master.address,
         bus: scenario.bus.params,
         t_dp: master.t_dp,
-        pace: Pace::Synch,
-        shared: false,
+        pace: master.pace,
+        shared: !scenario.class1.is_empty(),
         rearm: if master.accumulate { Rearm::LastSent } else { Rearm::Grid },
         dx_retries: master.dx_retries,
         lost_after: master.lost_after.min(u16::MAX.into()) as u16,
@@ -181,6 +191,29 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
     let life = LifeSettings { t_mapc: master.t_mapc, start: master.life_start, delay: master.life_delay };
     let addresses = slaves.iter().map(|slave| slave.address);
     Master::new(settings, Controller::new(addresses, life))
+}
+
+/// A free-running master beside `[master]`.
+fn further_master(scenario: &Scenario, class1: &Class1) -> Master<Controller> {
+    let slaves: Vec<&Slave> = scenario.slaves_of(class1.address).collect();
+    let settings = Settings {
+        address: class1.address,
+        bus: scenario.bus.params,
+        // What it is for is the pace of Global_Control.
+        t_dp: class1.least_cycle.max(Span::from_ms(1)),
+        pace: Pace::Free { least: class1.least_cycle },
+        shared: true,
+        rearm: Rearm::Grid,
+        dx_retries: class1.dx_retries,
+        lost_after: class1.lost_after.min(u16::MAX.into()) as u16,
+        clear_for: class1.clear_for,
+        active_spare: false,
+        data_control_time: class1.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
+        auto_clear: false,
+        slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
+    };
+    let life = LifeSettings { t_mapc: 1, start: 1, delay: 0 };
+    Master::new(settings, Controller::new(slaves.iter().map(|slave| slave.address), life))
 }
 
 /// The scenario's, else the time after which slaves without a master clear their outputs, so that both sides agree.
@@ -228,10 +261,12 @@ fn crystal(seed: u64, station: Address, crystal: scenario::Crystal) -> Crystal {
 }
 
 /// An action as orders to stations.
-fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Act<Command>)> {
+fn acts(scenario: &Scenario, slaves: &[Address], action: Action) -> Vec<(Address, Act<Command>)> {
+    let master = scenario.master.address;
+    let owner = |slave| scenario.slave(slave).map_or(master, |slave| slave.master);
     let to_slaves = |act: Act<Command>| slaves.iter().map(|&slave| (slave, act)).collect();
     let for_slaves = |order: &dyn Fn(Address) -> controller::Command| {
-        slaves.iter().map(|&slave| (master, Act::Command(Command::Application(order(slave))))).collect()
+        slaves.iter().map(|&slave| (owner(slave), Act::Command(Command::Application(order(slave))))).collect()
     };
     match action {
         Action::PowerOff => to_slaves(Act::PowerOff),
@@ -246,7 +281,7 @@ fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Ac
             controller::Command::ChangeParameter(slave, address, format, value)
         }),
         Action::Startup { telegram, patch } => {
-            slaves.iter().map(|&slave| (master, Act::Command(Command::Patch(slave, telegram, patch)))).collect()
+            slaves.iter().map(|&slave| (owner(slave), Act::Command(Command::Patch(slave, telegram, patch)))).collect()
         }
         Action::Clear => vec![(master, Act::Command(Command::Mode(MasterMode::Clear)))],
         Action::Operate => vec![(master, Act::Command(Command::Mode(MasterMode::Operate)))],

@@ -6,6 +6,7 @@
 //! into one [`ScenarioError`].
 
 mod check;
+mod class1;
 pub mod error;
 #[cfg(test)]
 mod faults;
@@ -20,7 +21,8 @@ pub use error::{Fault, Position, Problem, ScenarioError};
 
 use crate::device::options::{Resolution, UnitOptions};
 use crate::device::profile::Device;
-pub use crate::dp::handler::{Patch, StartupTelegram};
+use crate::dp::handler::{Patch, StartupTelegram};
+pub use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
 pub use crate::sim::fault::{Bursts, Disturbance, Service};
 use crate::sim::motion::Motion;
@@ -29,6 +31,7 @@ use crate::time::{Span, Tbit};
 use crate::wire::Address;
 use crate::wire::control::GlobalControl;
 pub use crate::wire::parameter::Format;
+pub use class1::Class1;
 use section::Reader;
 pub(super) use section::suggestion;
 pub use services::{MasterServices, SlaveServices};
@@ -48,8 +51,10 @@ pub struct Scenario {
     pub run: Run,
     /// The line.
     pub bus: Bus,
-    /// The only master.
+    /// The master whose figures are taken.
     pub master: Master,
+    /// Further, free-running class 1 masters in the order of the file.
+    pub class1: Vec<Class1>,
     /// The slaves in address order, which is the order of Data_Exchange (Model: D6).
     pub slaves: Vec<Slave>,
     /// Slave-to-slave links in the order of the file.
@@ -110,7 +115,7 @@ impl Scenario {
     }
     /// The slaves that the master has in its list, in address order: all but the silent ones.
     pub fn configured(&self) -> impl Iterator<Item = &Slave> {
-        self.slaves.iter().filter(|slave| !slave.silent)
+        self.slaves_of(self.master.address)
     }
     /// Whether the slave at `address` is parameterised as publisher.
     pub fn publishes(&self, address: Address) -> bool {
@@ -227,7 +232,11 @@ pub struct Master {
     pub position_mm: u64,
     /// How far its crystal is off.
     pub crystal: Crystal,
-    /// Bus cycle T_DP (manual 3.3.2).
+    /// Whether its cycles begin with SYNCH.
+    pub pace: Pace,
+    /// When its supply comes on.
+    pub powered_at: Span,
+    /// Bus cycle T_DP (manual 3.3.2); without SYNCH the planned cycle.
     pub t_dp: Span,
     /// Master application cycle T_MAPC (T_DP), 1..=14 (manual 3.3.3).
     pub t_mapc: u8,
@@ -300,6 +309,8 @@ impl Watchdog {
 pub struct Slave {
     /// Its address, 0..=125.
     pub address: Address,
+    /// The master that has it in its list.
+    pub master: Address,
     /// What it is.
     pub device: Device,
     /// Where on the cable it sits (mm).
@@ -386,7 +397,8 @@ pub struct Link {
 pub struct Event {
     /// When.
     pub when: When,
-    /// Which slaves it is about, in address order; empty for an order to the master alone.
+    /// Which slaves it is about, in address order; empty for an order to the master alone. The supply of masters can
+    /// be switched too.
     pub slaves: Vec<Address>,
     /// What to do.
     pub action: Action,
@@ -513,6 +525,7 @@ pub(crate) mod tests {
         let (t_i, t_o, t_pll_w) = (Span::from_us(125), Span::from_ms(4), Span::from_us(1));
         let slave = |number| Slave {
             address: address(number),
+            master: address(2),
             device: device.clone(),
             position_mm: 0,
             crystal: Crystal::Offset(0),
@@ -537,6 +550,8 @@ pub(crate) mod tests {
                 address: address(2),
                 position_mm: 0,
                 crystal: Crystal::Offset(0),
+                pace: Pace::Synch,
+                powered_at: Span::ZERO,
                 t_dp: Span::from_ms(8),
                 t_mapc: 1,
                 watchdog: Watchdog::of(Span::from_ms(200)),
@@ -551,6 +566,7 @@ pub(crate) mod tests {
                 active_spare: false,
                 services: MasterServices::default(),
             },
+            class1: Vec::new(),
             slaves: (3..3 + n).map(slave).collect(),
             links: Vec::new(),
             events: Vec::new(),

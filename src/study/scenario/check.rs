@@ -1,13 +1,15 @@
 //! The rules between the keys of a scenario: one function per rule, each of which names the rule with its source, the
 //! numbers, and the nearest right value.
 
+use super::class1;
 use super::error::Fault;
 use super::kinds::jitter_bound;
 use super::section::Reader;
 use super::services;
 use super::tree::Place;
-use super::{Action, Bus, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Scenario, Slave, When};
+use super::{Action, Bus, Class1, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Scenario, Slave, When};
 use crate::device::options::Resolution;
+use crate::dp::master::Pace;
 use crate::sim::motion;
 use crate::sim::noise::GcJitter;
 use crate::study::build;
@@ -25,19 +27,20 @@ pub(super) struct Facts<'a> {
     plan: Plan,
 }
 
-/// All rules in stages. A stage takes for granted that the stages before found nothing.
-const STAGES: &[&[Rule]] = &[
-    &[some_slave, own_addresses, addresses_within_hsa, positions, crystals, run_length],
-    &[isochronous_rate, bus_parameters, device_max_tsdr, own_t_sdr],
-    &[t_dp_limits, t_dp_grid, t_dp_content, t_mapc, watchdog_outlasts_t_dp],
-    &[services::slave_interval, services::data_control_time, services::sync_and_freeze],
-    &[encoder_parameters, resolution],
-    &[t_i_grid, t_o_grid, t_i_minimum, t_o_minimum, t_o_maximum, window, delay, least_window],
-    &[quantum],
-    &[functions, code_sequence, units_per_rev, total_range, jitter_fits, cycles_fit],
-    &[publishers, subscribers, samples, link_counts, link_watchdog],
-    &[event_stations, event_instants, disturbance_stations, services::commands],
-    &[start_up],
+/// All rules in stages, those of isochronous mode and those of every master. A stage takes for granted that the stages
+/// before found nothing.
+const STAGES: &[(&[Rule], &[Rule])] = &[
+    (&[], &[some_slave, own_addresses, class1::stations, addresses_within_hsa, positions, crystals, run_length]),
+    (&[isochronous_rate], &[bus_parameters, device_max_tsdr, own_t_sdr]),
+    (&[t_dp_limits, t_dp_grid, t_dp_content], &[t_mapc, watchdog_outlasts_t_dp]),
+    (&[services::slave_interval], &[services::data_control_time, services::sync_and_freeze]),
+    (&[], &[encoder_parameters, resolution]),
+    (&[t_i_grid, t_o_grid, t_i_minimum, t_o_minimum, t_o_maximum, window, delay, least_window], &[]),
+    (&[quantum], &[]),
+    (&[jitter_fits], &[functions, code_sequence, units_per_rev, total_range, cycles_fit]),
+    (&[], &[publishers, subscribers, samples, link_counts, link_watchdog]),
+    (&[], &[event_stations, class1::event_stations, event_instants, disturbance_stations, services::commands]),
+    (&[start_up], &[]),
 ];
 
 /// Largest offset of a crystal. Model: twice what cheap ones have over temperature and age.
@@ -48,8 +51,9 @@ const LINKS_MAX: usize = 29;
 /// Checks `scenario` stage by stage until one complains.
 pub(super) fn check(scenario: &Scenario, reader: &mut Reader<'_>) -> Vec<super::error::Problem> {
     let facts = Facts { scenario, plan: Plan::of(scenario) };
-    for stage in STAGES {
-        for rule in *stage {
+    for (isochronous, always) in STAGES {
+        let isochronous = isochronous.iter().filter(|_| scenario.master.pace == Pace::Synch);
+        for rule in isochronous.chain(*always) {
             rule(&facts, reader);
         }
         let problems = reader.take_problems();
@@ -93,11 +97,17 @@ fn own_addresses(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     }
 }
 
+/// The further masters with their paths.
+fn further<'a>(facts: &Facts<'a>) -> impl Iterator<Item = (&'a Class1, String)> {
+    facts.scenario.class1.iter().enumerate().map(|(i, class1)| (class1, format!("class1.{}", i + 1)))
+}
+
 fn addresses_within_hsa(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let hsa = facts.scenario.bus.params.hsa;
     let master = facts.scenario.master.address;
     let slaves = facts.scenario.slaves.iter().map(|s| (s.address, format!("slave.{}.address", s.address)));
-    for (address, key) in slaves.chain([(master, "master.address".to_owned())]) {
+    let further = further(facts).map(|(class1, path)| (class1.address, format!("{path}.address")));
+    for (address, key) in slaves.chain([(master, "master.address".to_owned())]).chain(further) {
         if address.get() > hsa {
             let fault = Fault::new(format!("the address {address} is above hsa = {hsa}"))
                 .rule("no station is above the highest station address HSA (EN 50170-2)")
@@ -110,7 +120,8 @@ fn addresses_within_hsa(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 fn positions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let cable = facts.scenario.bus.cable_mm;
     let slaves = facts.scenario.slaves.iter().map(|s| (s.position_mm, format!("slave.{}.position", s.address)));
-    for (mm, key) in slaves.chain([(facts.scenario.master.position_mm, "master.position".to_owned())]) {
+    let further = further(facts).map(|(class1, path)| (class1.position_mm, format!("{path}.position")));
+    for (mm, key) in slaves.chain([(facts.scenario.master.position_mm, "master.position".to_owned())]).chain(further) {
         if mm > cable {
             let fault = Fault::new(format!("{} is beyond the end of the cable", metres(mm)))
                 .rule(format!("a station is 0 m to {} along the cable (Model: one line)", metres(cable)))
@@ -122,7 +133,8 @@ fn positions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn crystals(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let slaves = facts.scenario.slaves.iter().map(|s| (s.crystal, format!("slave.{}.crystal", s.address)));
-    for (crystal, key) in slaves.chain([(facts.scenario.master.crystal, "master.crystal".to_owned())]) {
+    let further = further(facts).map(|(class1, path)| (class1.crystal, format!("{path}.crystal")));
+    for (crystal, key) in slaves.chain([(facts.scenario.master.crystal, "master.crystal".to_owned())]).chain(further) {
         let (Crystal::Offset(ppb) | Crystal::Within(ppb)) = crystal;
         if ppb.abs() > CRYSTAL_MAX_PPB {
             let fault = Fault::new(format!("a crystal is not off by {} ppm", ppb as f64 / 1e3))
@@ -169,7 +181,7 @@ fn bus_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn device_max_tsdr(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let params = &facts.scenario.bus.params;
-    let slowest = facts.scenario.configured().max_by_key(|slave| slave.device.max_tsdr(params.rate));
+    let slowest = facts.scenario.answering().max_by_key(|slave| slave.device.max_tsdr(params.rate));
     let Some(slave) = slowest else { return };
     let needed = slave.device.max_tsdr(params.rate);
     if needed > params.max_tsdr {
@@ -182,7 +194,7 @@ fn device_max_tsdr(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn own_t_sdr(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let params = &facts.scenario.bus.params;
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         let min = params.min_tsdr;
         let max = slave.device.max_tsdr(params.rate).max(min);
         if !(min..=max).contains(&slave.t_sdr) {
@@ -411,7 +423,7 @@ fn iso_units(reader: &mut Reader<'_>, slave: &Slave, of: (&str, Span), min: Span
 
 /// Octet 15 and scaling belong to the encoders' parameter block, which a subscriber does not have.
 fn encoder_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured().filter(|slave| slave.device.subscriber) {
+    for slave in facts.scenario.answering().filter(|slave| slave.device.subscriber) {
         let given = [
             ("scaling", slave.scaling.is_some()),
             ("functions", slave.functions),
@@ -429,7 +441,7 @@ fn encoder_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 /// The positions of a disc fit into the words of telegram 81.
 fn resolution(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         let Resolution { steps_per_rev, revolutions } = slave.resolution();
         if let Err(error) = motion::Resolution::new(steps_per_rev, revolutions) {
             let fault = Fault::new(error.to_string()).rule("G1_XIST1 and G1_XIST2 have 32 bits (manual 2.2)");
@@ -439,7 +451,7 @@ fn resolution(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn functions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         if slave.scaling.is_some() && !slave.functions {
             let fault = Fault::new(format!("slave {} has scaling, but functions = false", slave.address))
                 .rule("scaling needs octet 15 bit 1 as well as bit 3 (manual 3.2.2, Model: D21)")
@@ -450,7 +462,7 @@ fn functions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn code_sequence(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         if slave.code_sequence == CodeSequence::Ccw && !slave.functions {
             let fault = Fault::new(format!("code_sequence = \"ccw\" has no effect in slave {}", slave.address))
                 .rule("the code sequence is in force with octet 15 bit 1 alone (manual 3.2.2)")
@@ -461,7 +473,7 @@ fn code_sequence(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn units_per_rev(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         let (Some(scaling), steps) = (slave.scaling, slave.resolution().steps_per_rev) else { continue };
         if !(1..=steps).contains(&scaling.units_per_rev) {
             let fault = Fault::new(format!("{} units per revolution are out of range", scaling.units_per_rev))
@@ -473,7 +485,7 @@ fn units_per_rev(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn total_range(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         let Some(scaling) = slave.scaling else { continue };
         let revolutions = slave.resolution().revolutions;
         let max = u64::from(scaling.units_per_rev) * u64::from(revolutions);
@@ -564,7 +576,7 @@ fn subscribers(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 /// The slave at `address`, if the master has it in its list.
 fn configured<'a>(facts: &Facts<'a>, address: Address) -> Option<&'a Slave> {
-    facts.scenario.slave(address).filter(|slave| !slave.silent)
+    facts.scenario.slave(address).filter(|slave| !slave.silent && slave.master == facts.scenario.master.address)
 }
 
 /// The fault of naming a slave that is not there, or silent.
@@ -614,7 +626,9 @@ fn link_watchdog(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn event_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for (i, event) in facts.scenario.events.iter().enumerate() {
+    let events = facts.scenario.events.iter().enumerate();
+    let orders = events.filter(|(_, event)| !matches!(event.action, Action::PowerOff | Action::PowerOn));
+    for (i, event) in orders {
         if let Some(&address) = event.slaves.iter().find(|&&address| facts.scenario.slave(address).is_none()) {
             let path = format!("event.{}", i + 1);
             about(reader, &format!("{path}.slave"), &[&format!("{path}.slaves")], no_slave(facts, address));
@@ -645,6 +659,7 @@ fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
         for (key, station) in [("from", from), ("to", to)] {
             if let Some(address) = *station
                 && address != facts.scenario.master.address
+                && facts.scenario.class1(address).is_none()
                 && facts.scenario.slave(address).is_none()
             {
                 let fault = no_slave(facts, address);
