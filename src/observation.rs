@@ -7,9 +7,9 @@
 use core::fmt;
 
 use crate::time::{Local, Span};
-use crate::wire::Address;
-use crate::wire::acyclic::ErrorCode;
+use crate::wire::acyclic::{AbortCode, ErrorCode};
 use crate::wire::parameter::{self, ErrorNumber};
+use crate::wire::{Address, Sap};
 
 macro_rules! named {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* }) => {
@@ -162,7 +162,7 @@ named! {
 named! {
     /// State of a slave-to-slave link in the subscriber (Model: D27).
     LinkState {
-        /// Nothing valid came yet, or not for the watchdog time.
+        /// Nothing came yet, or not for the watchdog time.
         Lost = "lost",
         /// Valid data came within the watchdog time.
         Active = "active",
@@ -214,6 +214,97 @@ named! {
     }
 }
 
+named! {
+    /// State of an MS2 connection, on either side.
+    ConnectionState {
+        /// There is none.
+        Closed = "closed",
+        /// Asked for, not confirmed yet.
+        Opening = "opening",
+        /// Nothing is asked.
+        Open = "open",
+        /// A request waits for its answer.
+        Working = "working",
+        /// Given up, the other side does not know yet.
+        Aborting = "aborting",
+    }
+}
+
+named! {
+    /// Which kind of master asks for an acyclic service.
+    MasterClass {
+        /// It parameterises its slaves and exchanges data with them.
+        One = "class 1",
+        /// A tool for commissioning and service.
+        Two = "class 2",
+    }
+}
+named! {
+    /// What a class 2 master reads or writes.
+    AcyclicService {
+        /// The diagnosis.
+        Diagnosis = "Slave_Diag",
+        /// The inputs of a slave.
+        Inputs = "RD_Inp",
+        /// The outputs of a slave.
+        Outputs = "RD_Outp",
+        /// The configuration.
+        Configuration = "Get_Cfg",
+        /// A record over MS2.
+        RecordRead = "Read",
+        /// A record over MS2.
+        RecordWrite = "Write",
+    }
+}
+named! {
+    /// How an acyclic service ended.
+    AcyclicResult {
+        /// The slave did it.
+        Positive = "positive",
+        /// The slave answered that it does not.
+        Negative = "negative",
+        /// Nothing that ends it came in time.
+        Timeout = "time-out",
+        /// Its connection was refused, aborted or closed.
+        Broken = "connection lost",
+    }
+}
+
+/// Why the state of an MS2 connection changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ConnectionCause {
+    /// The master asked for it.
+    Initiated,
+    /// The slave confirmed it.
+    Confirmed,
+    /// No connection is free, or the slave has closed it.
+    Refused,
+    /// This side gives it up.
+    GaveUp(AbortCode),
+    /// The other side aborted it: octet 3 of the abort, instance and code.
+    Aborted(u8),
+    /// The other side knows of the abort.
+    Told,
+    /// The other side does not ask any more.
+    Silence,
+}
+impl fmt::Display for ConnectionCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Initiated => f.write_str("Initiate"),
+            Self::Confirmed => f.write_str("confirmed"),
+            Self::Refused => f.write_str("refused, SAP closed"),
+            Self::GaveUp(code) => write!(f, "given up, {code}"),
+            Self::Aborted(reason) => match AbortCode::from_code(reason & 0x0F) {
+                Some(code) => write!(f, "aborted by the other side, {code}"),
+                None => write!(f, "aborted by the other side, reason {reason:02X}"),
+            },
+            Self::Told => f.write_str("abort told"),
+            Self::Silence => f.write_str("nothing heard"),
+        }
+    }
+}
+
 /// Why an acyclic request failed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum AcyclicFailure {
@@ -223,6 +314,8 @@ pub enum AcyclicFailure {
     Timeout,
     /// The slave left data exchange.
     Left,
+    /// The connection was aborted, by either side: octet 3 of the abort, instance and code.
+    Aborted(u8),
     /// The slave refused it, with this class and code (DP-V1).
     Refused(ErrorCode),
     /// The answer cannot be read.
@@ -234,6 +327,10 @@ impl fmt::Display for AcyclicFailure {
             Self::Closed => f.write_str("its service access point is closed"),
             Self::Timeout => f.write_str("no answer in time"),
             Self::Left => f.write_str("it left data exchange"),
+            Self::Aborted(reason) => match AbortCode::from_code(reason & 0x0F) {
+                Some(code) => write!(f, "the connection was aborted, {code}"),
+                None => write!(f, "the connection was aborted, reason {reason:02X}"),
+            },
             Self::Refused(code) => write!(f, "refused: {code}"),
             Self::Unreadable => f.write_str("its answer cannot be read"),
         }
@@ -444,6 +541,44 @@ pub enum Observation {
         why: AcyclicFailure,
     },
 
+    /// What a class 2 master has read from a slave or written to it, but for parameters.
+    AcyclicData {
+        /// The slave.
+        slave: Address,
+        /// By which service.
+        service: AcyclicService,
+        /// Slot and index of a record.
+        record: Option<(u8, u8)>,
+        /// Octets of the data.
+        len: u8,
+        /// The first of them, zero where there are none.
+        head: [u8; 8],
+    },
+    /// An acyclic service is over: a PDU and its answer, or the repeated polls for it, or one read of DP-V0.
+    AcyclicDone {
+        /// Of whom it was asked.
+        slave: Address,
+        /// By which kind of master.
+        class: MasterClass,
+        /// How it ended.
+        result: AcyclicResult,
+        /// From its beginning at the master to here.
+        took: Span,
+    },
+    /// An MS2 connection was opened or closed, seen by the slave or by the class 2 master. Its requests are not told.
+    Connection {
+        /// The other side.
+        peer: Address,
+        /// The slave's SAP; 49 before the resource manager has named another.
+        sap: Sap,
+        /// Before.
+        from: ConnectionState,
+        /// Now.
+        to: ConnectionState,
+        /// Why.
+        why: ConnectionCause,
+    },
+
     // ----- slave
     /// A slave's DP state changed.
     SlaveState {
@@ -542,6 +677,13 @@ pub enum Observation {
         /// Whose.
         publisher: Address,
     },
+    /// A publisher's reply came with another length than parameterised and was not taken over.
+    WrongLength {
+        /// Whose.
+        publisher: Address,
+        /// Its length (octets).
+        length: u8,
+    },
     /// A subscriber used a publisher's value at its T_O.
     Used {
         /// Whose.
@@ -605,16 +747,71 @@ impl Observation {
                 | Self::Latch { .. }
                 | Self::SetPoint { expected: true, .. }
                 | Self::Subscribed { .. }
+                | Self::WrongLength { .. }
                 | Self::Used { .. }
+                | Self::AcyclicDone { .. }
                 | Self::Gap { .. }
                 | Self::TokenReceived { .. }
         )
     }
 }
 
+impl Observation {
+    /// What is about acyclic services, as text; nothing for anything else.
+    fn fmt_acyclic(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ParameterRequest { slave, pnu, subindex, elements, change } => {
+                let verb = if *change { "change" } else { "read" };
+                write!(f, "slave {slave}: {verb} P{pnu}[{subindex}], {elements} elements, {}", parameter::name(*pnu))
+            }
+            Self::ParameterValue { slave, pnu, subindex, value } => {
+                let element = parameter::element(*pnu, *subindex);
+                write!(f, "slave {slave}: P{pnu}[{subindex}] = {value} ({value:X} hex), {element}")
+            }
+            Self::ParameterError { slave, pnu, subindex, number } => {
+                let name = ErrorNumber::from_code(*number).map_or("error not assigned", ErrorNumber::name);
+                write!(f, "slave {slave}: P{pnu}[{subindex}] error {number:02X}, {name}")
+            }
+            Self::AcyclicFailed { slave, why } => write!(f, "slave {slave}: acyclic request failed, {why}"),
+            Self::AcyclicData { slave, service, record, len, head } => {
+                write!(f, "slave {slave}: {service}")?;
+                if let Some((slot, index)) = record {
+                    write!(f, " slot {slot} index {index}")?;
+                }
+                write!(f, ", {len} octets")?;
+                head.iter().take((*len).into()).try_for_each(|octet| write!(f, " {octet:02X}"))?;
+                if usize::from(*len) > head.len() { f.write_str(" ...") } else { Ok(()) }
+            }
+            Self::AcyclicDone { slave, class, result, took } => {
+                write!(f, "slave {slave}: acyclic service of {class} {result} after {took}")
+            }
+            Self::Connection { peer, sap, from, to, why } => {
+                write!(f, "MS2 with {peer} at SAP {sap}: {from} -> {to} ({why})")
+            }
+            _ => Ok(()),
+        }
+    }
+    /// What happens at the instants of a slave's clock, as text; nothing for anything else.
+    fn fmt_clock(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Clock { verdict, error, window, counter, .. } => {
+                write!(f, "clock {verdict}, error {error}, window {window}, failure counter {counter}")
+            }
+            Self::Latch { locked, inputs } => {
+                write!(f, "latch {} ({})", inputs.xist1, if *locked { "at T_I" } else { "free-running" })
+            }
+            Self::SetPoint { mls, sls, counter, expected } => {
+                let verdict = if *expected { "expected" } else { "NOT EXPECTED" };
+                write!(f, "T_O, master sign of life {mls} {verdict}, own {sls}, failure counter {counter}")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// One line in the field's words.
 impl fmt::Display for Observation {
-    #[allow(clippy::too_many_lines, reason = "a line for each observation")]
+    #[allow(clippy::too_many_lines)] // A line or two for each observation.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::CycleStart { cycle, .. } => write!(f, "cycle {cycle} starts"),
@@ -658,42 +855,30 @@ impl fmt::Display for Observation {
             Self::MasterLifeHeld { slave, held } => {
                 write!(f, "master sign of life for {slave} {}", if *held { "held" } else { "running" })
             }
-            Self::ParameterRequest { slave, pnu, subindex, elements, change } => {
-                let verb = if *change { "change" } else { "read" };
-                write!(f, "slave {slave}: {verb} P{pnu}[{subindex}], {elements} elements, {}", parameter::name(*pnu))
-            }
-            Self::ParameterValue { slave, pnu, subindex, value } => {
-                let element = parameter::element(*pnu, *subindex);
-                write!(f, "slave {slave}: P{pnu}[{subindex}] = {value} ({value:X} hex), {element}")
-            }
-            Self::ParameterError { slave, pnu, subindex, number } => {
-                let name = ErrorNumber::from_code(*number).map_or("error not assigned", ErrorNumber::name);
-                write!(f, "slave {slave}: P{pnu}[{subindex}] error {number:02X}, {name}")
-            }
-            Self::AcyclicFailed { slave, why } => write!(f, "slave {slave}: acyclic request failed, {why}"),
+            Self::ParameterRequest { .. }
+            | Self::ParameterValue { .. }
+            | Self::ParameterError { .. }
+            | Self::AcyclicFailed { .. }
+            | Self::AcyclicData { .. }
+            | Self::AcyclicDone { .. }
+            | Self::Connection { .. } => self.fmt_acyclic(f),
             Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
             Self::Held { outputs, inputs } => {
                 let word = |on: bool| if on { "on" } else { "off" };
                 write!(f, "Sync mode {}, Freeze mode {}", word(*outputs), word(*inputs))
             }
             Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
-            Self::Clock { verdict, error, window, counter, .. } => {
-                write!(f, "clock {verdict}, error {error}, window {window}, failure counter {counter}")
-            }
+            Self::Clock { .. } | Self::Latch { .. } | Self::SetPoint { .. } => self.fmt_clock(f),
             Self::Pll { from, to } => write!(f, "PLL {from} -> {to}"),
-            Self::Latch { locked, inputs } => {
-                write!(f, "latch {} ({})", inputs.xist1, if *locked { "at T_I" } else { "free-running" })
-            }
-            Self::SetPoint { mls, sls, counter, expected } => {
-                let verdict = if *expected { "expected" } else { "NOT EXPECTED" };
-                write!(f, "T_O, master sign of life {mls} {verdict}, own {sls}, failure counter {counter}")
-            }
             Self::MasterLife { from, to } => write!(f, "master sign of life {from} -> {to}"),
             Self::Fault { code } => write!(f, "fault {code:04X}"),
             Self::Acknowledged { code } => write!(f, "fault {code:04X} acknowledged"),
             Self::Leds { from, to } => write!(f, "LEDs red/green {from} -> {to}"),
             Self::Power { on } => write!(f, "supply {}", if *on { "on" } else { "off" }),
             Self::Subscribed { publisher } => write!(f, "data of publisher {publisher}"),
+            Self::WrongLength { publisher, length } => {
+                write!(f, "{length} octets of publisher {publisher}, wrong length")
+            }
             Self::Used { publisher, position } => write!(f, "position {position} of publisher {publisher} used"),
             Self::Link { publisher, from, to } => write!(f, "link to {publisher}: {from} -> {to}"),
             Self::Collision { with } => write!(f, "collision with {with}"),

@@ -38,7 +38,7 @@ fn one_device_is_told_in_full() {
             "{all}"
         );
         for parameter in PARAMETERS {
-            assert_eq!(all.contains(&format!("P{}", parameter.pnu)), profile.publisher, "{all}");
+            assert_eq!(all.contains(&format!("P{}", parameter.pnu)), !profile.subscriber, "{all}");
         }
     }
     let (_, all, _) = devices(&["simodrive-sensor-isochron"]);

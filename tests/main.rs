@@ -4,6 +4,7 @@ mod cli;
 mod determinism;
 mod devices;
 mod dp_services;
+mod dxb;
 mod encoder;
 mod encoder_scenarios;
 mod foreign;

@@ -5,7 +5,6 @@ use alloc::sync::Arc;
 use core::fmt;
 use core::ops::Deref;
 
-use crate::device::drive::MAX_LINKS;
 use crate::device::options::Resolution;
 use crate::fdl::params::BusParams;
 use crate::time::{BitRate, Span, Tbit};
@@ -63,8 +62,8 @@ pub struct Profile {
     pub publisher: bool,
     /// Whether it can receive other slaves' inputs.
     pub subscriber: bool,
-    /// Most links that its subscriber function has (DXB_Max_Link_Count).
-    pub max_links: u8,
+    /// What it takes as a subscriber.
+    pub dxb: DxbLimits,
     /// Octets of Set_Prm from octet 8 on that it takes at most (Max_User_Prm_Data_Len).
     pub max_prm: u8,
     /// Whether an empty Data_Exchange means Clear to it.
@@ -81,6 +80,26 @@ pub struct Profile {
     pub acyclic: bool,
     /// Where all this comes from.
     pub source: Cow<'static, str>,
+}
+
+/// What a subscriber takes (GSD keywords DXB_Max_Link_Count, DXB_Max_Data_Length).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct DxbLimits {
+    /// Entries of both tables together, at most [`DxbLimits::MOST_LINKS`].
+    pub links: u8,
+    /// Longest sample, and the data area of each slot (octets).
+    pub data: u8,
+    /// Slots with a data area for the subscriber table, numbered from 1.
+    pub slots: u8,
+}
+
+impl DxbLimits {
+    /// Most links of a subscriber (VPC3+C manual).
+    pub const MOST_LINKS: u8 = 29;
+    /// No subscriber.
+    pub const NONE: Self = Self { links: 0, data: 0, slots: 0 };
+    /// All that the ASIC allows. Model: two slots, so that samples can go to one or the other.
+    pub const FULL: Self = Self { links: Self::MOST_LINKS, data: 244, slots: 2 };
 }
 
 impl Profile {
@@ -122,7 +141,8 @@ struct Row {
     ident: u16,
     config: &'static [u8],
     max_tsdr: [Tbit; BitRate::ALL.len()],
-    subscriber: bool,
+    publisher: bool,
+    dxb: DxbLimits,
     sync_freeze: bool,
     max_diag: u8,
     source: &'static str,
@@ -152,16 +172,16 @@ const fn profile(row: Row) -> Profile {
         min_window: MIN_WINDOW,
         steps_per_rev: DISC.steps_per_rev,
         revolutions: DISC.revolutions,
-        publisher: !row.subscriber,
-        subscriber: row.subscriber,
-        max_links: if row.subscriber { MAX_LINKS as u8 } else { 0 },
-        max_prm: if row.subscriber { MAX_PRM } else { 52 },
+        publisher: row.publisher,
+        subscriber: row.dxb.links > 0,
+        dxb: row.dxb,
+        max_prm: if row.dxb.links > 0 { MAX_PRM } else { 52 },
         fail_safe: true,
         sync: row.sync_freeze,
         freeze: row.sync_freeze,
         max_diag: row.max_diag,
         min_slave_interval: Span::from_us(100),
-        acyclic: !row.subscriber,
+        acyclic: row.dxb.links == 0,
         source: Cow::Borrowed(row.source),
     }
 }
@@ -178,7 +198,7 @@ pub const DISC: Resolution = Resolution { steps_per_rev: 8_192, revolutions: 4_0
 pub const MAX_PRM: u8 = prm::MAX_PRM as u8 - 7;
 
 /// Max_Diag_Data_Len of a subscriber (octets): the standard part and the status of 29 links. Model: D24, VPC3+C.
-const SUBSCRIBER_MAX_DIAG: u8 = 6 + 4 + 2 * 29;
+const SUBSCRIBER_MAX_DIAG: u8 = 6 + 4 + 2 * DxbLimits::MOST_LINKS;
 
 /// Every device, in the order in which lists show them.
 pub const PROFILES: &[Profile] = &[
@@ -188,7 +208,8 @@ pub const PROFILES: &[Profile] = &[
         ident: 0x06DF,
         config: TELEGRAM_81,
         max_tsdr: profile_max_tsdr(),
-        subscriber: false,
+        publisher: true,
+        dxb: DxbLimits::NONE,
         // The encoder manuals say nothing of Sync and Freeze.
         sync_freeze: false,
         max_diag: 6,
@@ -200,7 +221,8 @@ pub const PROFILES: &[Profile] = &[
         ident: 0x06DF,
         config: TELEGRAM_81,
         max_tsdr: profile_max_tsdr(),
-        subscriber: false,
+        publisher: true,
+        dxb: DxbLimits::NONE,
         // The encoder manuals say nothing of Sync and Freeze.
         sync_freeze: false,
         max_diag: 6,
@@ -212,8 +234,9 @@ pub const PROFILES: &[Profile] = &[
         ident: 0x80F9,
         config: TELEGRAM_81,
         max_tsdr: fast_max_tsdr(),
+        publisher: true,
+        dxb: DxbLimits::NONE,
         sync_freeze: true,
-        subscriber: false,
         max_diag: 6,
         source: "SIEM80F9.GSE; times with octet 15 bit 1 and the narrowest window as the encoder manual, 3.2.2, 3.3.8",
     }),
@@ -224,10 +247,23 @@ pub const PROFILES: &[Profile] = &[
         ident: 0xF0D0,
         config: &[0xC3, 0xC1, 0xC5, 0xFD, 0x00, 0x00],
         max_tsdr: profile_max_tsdr(),
-        subscriber: true,
+        publisher: false,
+        dxb: DxbLimits::FULL,
         sync_freeze: false,
         max_diag: SUBSCRIBER_MAX_DIAG,
-        source: "Model: D24",
+        source: "Model: D24; links as VPC3+C",
+    }),
+    profile(Row {
+        name: "coupled-drive",
+        title: "generic DP-V2 slave that follows a publisher and publishes what it follows",
+        ident: 0xF0D1,
+        config: &[0xC3, 0xC1, 0xC5, 0xFD, 0x00, 0x00],
+        max_tsdr: profile_max_tsdr(),
+        publisher: true,
+        dxb: DxbLimits::FULL,
+        sync_freeze: false,
+        max_diag: SUBSCRIBER_MAX_DIAG,
+        source: "Model: subscriber-drive (D24) with the publisher function, for chains of slaves",
     }),
 ];
 
@@ -306,7 +342,9 @@ mod tests {
             assert_eq!(find(&profile.name), Some(profile));
             assert!(!profile.title.is_empty() && !profile.source.is_empty() && profile.ident != 0, "{}", profile.name);
             assert!(profile.t_dp_min.is_multiple_of(profile.dp_grid()), "{}", profile.name);
-            assert!(profile.publisher != profile.subscriber, "{}", profile.name);
+            assert!(profile.publisher || profile.subscriber, "{}", profile.name);
+            assert_eq!(profile.subscriber, profile.dxb != DxbLimits::NONE, "{}", profile.name);
+            assert!(profile.dxb.links <= DxbLimits::MOST_LINKS, "{}", profile.name);
         }
         assert_eq!(find("posital"), None);
     }

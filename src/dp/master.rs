@@ -44,19 +44,17 @@ use cycle::Polling;
 
 use crate::dp::handler::{Answer, Handler, Patch, SAP_FRAME_OCTETS, SlaveParams, StartupTelegram};
 use crate::dp::iso::{CycleClock, Rearm};
-use crate::dp::ms1::{Client, Failure, Job, MS1, Progress};
+use crate::dp::ms1::{self, Client, Failure, Job, MS1, Progress};
 use crate::dp::supervision::Supervision;
 use crate::dp::{GLOBAL_CONTROL, SLAVE_DIAG};
 use crate::fdl::active::{Active, Confirm, Request};
 use crate::fdl::params::BusParams;
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
-use crate::observation::{HandlerState, MasterMode, Observation};
+use crate::observation::{HandlerState, MasterClass, MasterMode, Observation};
 use crate::time::{Local, Span};
 use crate::wire::control::GlobalControl;
 use crate::wire::{Address, Service, Status};
 
-/// C1_Response_Timeout (SIEM80F9.GSE).
-const C1_RESPONSE_TIMEOUT: Span = Span::from_s(10);
 /// Characters of a Global_Control telegram.
 const GC_OCTETS: usize = 13;
 /// Characters of an FDL status request and its answer.
@@ -122,6 +120,8 @@ pub struct Settings {
     pub active_spare: bool,
     /// Data_Control_Time; the mode is told to the slaves at least every third of it (Model: D5).
     pub data_control_time: Span,
+    /// C1_Response_Timeout, after which an acyclic job is given up; the GSD file counts it in 10 ms.
+    pub ms1_timeout: Span,
     /// Error_Action_Flag: back to Clear when a slave misses Data_Exchange for Data_Control_Time.
     pub auto_clear: bool,
     /// The slaves, in the order in which they are polled.
@@ -207,7 +207,7 @@ impl<A: Application> Master<A> {
             commands: Vec::new(),
             supervision: Supervision::new(settings.auto_clear, settings.data_control_time, settings.clear_for),
             startup_next: 0,
-            ms1: Client::new(C1_RESPONSE_TIMEOUT),
+            ms1: Client::new(settings.ms1_timeout),
             begun: 0,
             polling: Polling::new(),
             settings,
@@ -404,6 +404,11 @@ impl<A: Application> Master<A> {
         let count = self.handlers.len();
         let mut slaves = (0..count).map(|i| (self.startup_next + i) % count);
         let starting = slaves.find(|&slave| self.handlers[slave].has_service());
+        // Also where the cycle had no time to ask.
+        let since = self.ms1.since().unwrap_or(now);
+        if let Some(slave) = self.ms1.overdue(now) {
+            self.acyclic_done((now - since, slave), Err(Failure::Timeout), out);
+        }
         if self.ms1.is_idle()
             && let Some(job) = self.app.acyclic()
         {
@@ -433,11 +438,18 @@ impl<A: Application> Master<A> {
             Confirm::Reply { status, .. } => Err(Some(status)),
             _ => Err(None),
         };
+        let since = self.ms1.since().unwrap_or(now);
         match self.ms1.answered(now, answer) {
             Progress::Going => {}
-            Progress::Done { slave, pdu } => self.app.acyclic_done(slave, Ok(pdu), out),
-            Progress::Failed { slave, why } => self.app.acyclic_done(slave, Err(why), out),
+            Progress::Done { slave, pdu } => self.acyclic_done((now - since, slave), Ok(pdu), out),
+            Progress::Failed { slave, why } => self.acyclic_done((now - since, slave), Err(why), out),
         }
+    }
+    /// An acyclic job is over after `took`.
+    fn acyclic_done(&mut self, (took, slave): (Span, usize), answer: Result<&[u8], Failure>, out: &mut Outbox) {
+        let (address, class) = (self.handlers[slave].params().address, MasterClass::One);
+        out.observe(Observation::AcyclicDone { slave: address, class, result: ms1::result(answer), took });
+        self.app.acyclic_done(slave, answer, out);
     }
     /// How often a request of `octets` characters with an answer of up to `reply` may be repeated before the next
     /// SYNCH; none if it does not fit once.
@@ -511,8 +523,10 @@ impl<A: Application> Master<A> {
         self.give_up_job(slave, out);
     }
     fn give_up_job(&mut self, slave: usize, out: &mut Outbox) {
+        let since = self.ms1.since();
         if self.ms1.left(slave) {
-            self.app.acyclic_done(slave, Err(Failure::Left), out);
+            let took = since.map_or(Span::ZERO, |since| (self.exchange_end - since).max(Span::ZERO));
+            self.acyclic_done((took, slave), Err(Failure::Left), out);
         }
     }
 }

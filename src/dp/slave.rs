@@ -19,6 +19,7 @@
 //! | DATA_EXCH | Data_Exchange by MSRD without Publisher_Enable | DATA_EXCH | RS |
 //! | DATA_EXCH | MS1 with DPV1_Enable | DATA_EXCH | see [`ms1`](crate::dp::ms1) |
 //! | any but POWER_ON | Slave_Diag, Get_Cfg | unchanged | data |
+//! | any but POWER_ON | MS2 of any master | unchanged | see [`ms2`](crate::dp::ms2) |
 //! | any | Set_Prm with neither Lock nor Unlock | unchanged, min T_SDR in force | SC |
 //! | WAIT_CFG, DATA_EXCH | Set_Prm, Chk_Cfg, Data_Exchange of another master | unchanged | RS |
 //!
@@ -31,7 +32,8 @@ use alloc::borrow::Cow;
 use core::fmt;
 
 use crate::dp::image::Image;
-use crate::dp::ms1::{Answer, Records, Server};
+use crate::dp::ms1::{Access, Answer, Records, Server};
+use crate::dp::ms2::{self, Manager, Message};
 use crate::fdl::passive::{Indication, Passive};
 use crate::fdl::{Filter, Heard, Outbox, Timer};
 use crate::observation::{Observation, SlaveCause, SlaveState};
@@ -42,7 +44,9 @@ use crate::wire::prm::{PrmError, SetPrm};
 use crate::wire::{Address, FrameControl, Header, Sap, Service, Status};
 
 /// Time from an acyclic request to its answer. Model: none of the sources has a number.
-const ACYCLIC_TIME: Span = Span::from_ms(2);
+pub const ACYCLIC_TIME: Span = Span::from_ms(2);
+/// C1_Max_Data_Len of the encoders (octets).
+const C1_MAX_DATA: u8 = 240;
 
 /// Why a slave does not take its parameters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -142,6 +146,8 @@ pub struct Identity {
     pub rate: BitRate,
     /// Own T_SDR.
     pub t_sdr: Tbit,
+    /// Its connections for class 2 masters.
+    pub ms2: ms2::Settings,
 }
 
 /// A request to execute.
@@ -170,6 +176,7 @@ pub struct Slave {
     /// DPV1_Enable: MS1 is open.
     dpv1: bool,
     ms1: Server,
+    ms2: Manager,
     image: Image,
     /// The diagnosis that its master knows: as it read it last, or as data exchange began.
     known: Known,
@@ -190,6 +197,7 @@ impl Slave {
         Self {
             passive: Passive::new(identity.address, identity.rate, identity.t_sdr),
             image: Image::new(identity.outputs, identity.inputs),
+            ms2: Manager::new(identity.ms2),
             identity,
             state: SlaveState::PowerOn,
             master: None,
@@ -199,7 +207,7 @@ impl Slave {
             fail_safe: false,
             publisher: false,
             dpv1: false,
-            ms1: Server::new(ACYCLIC_TIME),
+            ms1: Server::new(ACYCLIC_TIME, C1_MAX_DATA),
             known: Known::default(),
         }
     }
@@ -223,6 +231,9 @@ impl Slave {
     /// The supply came on: everything from before is forgotten, initialisation takes no time.
     pub fn power_on(&mut self, now: Local, app: &mut impl Application, out: &mut Outbox) {
         *self = Self::new(self.identity.clone());
+        for connection in 0..self.identity.ms2.connections {
+            app.closed(Access::Ms2(connection));
+        }
         self.enter(SlaveState::WaitPrm, SlaveCause::Initialised, now, app, out);
     }
     /// [`Timer::Watchdog`] came due.
@@ -274,6 +285,10 @@ impl Slave {
                 self.passive.reply(now, Status::Dl, outputs.len(), out, |du| du.copy_from_slice(outputs));
             }
             (Some(Sap::MS1), Some(Sap::MASTER_MS1)) => self.ms1(request, app, out),
+            (Some(dsap), Some(ssap)) if self.ms2.has(dsap) => {
+                let message = Message { master: header.sa, ssap, dsap, du };
+                self.ms2(now, &message, app, out);
+            }
             _ => self.refuse(now, out),
         }
     }
@@ -282,10 +297,21 @@ impl Slave {
         if self.state != SlaveState::DataExch || !self.dpv1 || self.is_foreign(header.sa) {
             return self.refuse(now, out);
         }
-        match self.ms1.heard(now, du, app) {
-            Answer::Acknowledge => self.passive.acknowledge(now, out),
-            Answer::Data(pdu) => self.passive.reply(now, Status::Dl, pdu.len(), out, |du| du.copy_from_slice(pdu)),
-            Answer::Refuse(status) => self.passive.reply(now, status, 0, out, |_| ()),
+        answer(&mut self.passive, now, self.ms1.heard(now, du, app), out);
+    }
+    fn ms2(&mut self, now: Local, message: &Message<'_>, app: &mut impl Application, out: &mut Outbox) {
+        answer(&mut self.passive, now, self.ms2.heard(now, message, app, out), out);
+        self.supervise(out);
+    }
+    /// [`Timer::Connection`] came due.
+    pub fn connection_due(&mut self, now: Local, app: &mut impl Application, out: &mut Outbox) {
+        self.ms2.due(now, app, out);
+        self.supervise(out);
+    }
+    fn supervise(&self, out: &mut Outbox) {
+        match self.ms2.deadline() {
+            Some(deadline) => out.arm(Timer::Connection, deadline),
+            None => out.disarm(Timer::Connection),
         }
     }
     fn refuse(&mut self, now: Local, out: &mut Outbox) {
@@ -478,7 +504,7 @@ impl Slave {
         out.observe(Observation::SlaveState { from, to: state, cause });
         if from == SlaveState::DataExch && state != SlaveState::DataExch {
             self.image.leave();
-            self.ms1.reset();
+            self.ms1.reset(app);
             app.leave(now, out);
         }
         if state == SlaveState::DataExch {
@@ -486,5 +512,14 @@ impl Slave {
             // Start-up reads the diagnosis anyway: only what changes from here on is news.
             self.known = self.news(app);
         }
+    }
+}
+
+/// Answers a request to an acyclic service.
+fn answer(passive: &mut Passive, now: Local, answer: Answer<'_>, out: &mut Outbox) {
+    match answer {
+        Answer::Acknowledge => passive.acknowledge(now, out),
+        Answer::Data(pdu) => passive.reply(now, Status::Dl, pdu.len(), out, |du| du.copy_from_slice(pdu)),
+        Answer::Refuse(status) => passive.reply(now, status, 0, out, |_| ()),
     }
 }

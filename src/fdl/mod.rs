@@ -150,11 +150,24 @@ pub enum Timer {
     SetPoint,
     /// The LEDs may change because nothing was heard.
     Leds,
+    /// A slave-to-slave link may be lost (Model: D27).
+    Links,
+    /// The supervision of an MS2 connection strikes; the earliest of all.
+    Connection,
 }
 
 impl Timer {
     /// Every timer, in the order of their numbers.
-    pub const ALL: [Self; 6] = [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint, Self::Leds];
+    pub const ALL: [Self; 8] = [
+        Self::Slot,
+        Self::Schedule,
+        Self::Watchdog,
+        Self::Window,
+        Self::SetPoint,
+        Self::Leds,
+        Self::Links,
+        Self::Connection,
+    ];
 }
 
 /// A station's answer to one input. Reused from step to step, so that no step allocates.
@@ -165,7 +178,7 @@ pub struct Outbox {
     cycle_at: Option<Local>,
     /// What becomes of the deadlines; an entry counts if its bit in `ordered` is set.
     orders: [Order; Self::DEADLINES],
-    ordered: u8,
+    ordered: u16,
     sample_with_telegrams: Option<bool>,
     observations: [Option<Observation>; Self::MAX_OBSERVATIONS],
     observed: usize,

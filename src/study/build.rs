@@ -5,11 +5,14 @@ use crate::device::drive::{Drive, Subscriber};
 use crate::device::encoder::{Disc, Encoder};
 use crate::device::node::{Command, Node};
 use crate::device::options::Resolution;
-use crate::device::unit::UnitSettings;
+use crate::device::tool::{self, Tool};
+use crate::device::unit::{self, UnitSettings};
 use crate::dp::CLOCK_GROUP;
+use crate::dp::class2::{self, Class2};
 use crate::dp::handler::SlaveParams;
 use crate::dp::iso::Rearm;
 use crate::dp::master::{Master, Pace, Settings};
+use crate::dp::ms2::{self, client};
 use crate::observation::MasterMode;
 use crate::sim::bus::Place;
 use crate::sim::crystal::Crystal;
@@ -23,7 +26,9 @@ use crate::time::{Local, Span, Time};
 use crate::wire::Address;
 use crate::wire::drive::G1Stw;
 use crate::wire::parameter::ParameterAddress;
-use crate::wire::prm::{DpV1Status, DxbLink, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81};
+use crate::wire::prm::{
+    DpV1Status, DxbLink, DxbSubscription, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81,
+};
 
 /// A station's clock shows anything up to this when the run begins: clocks need not agree.
 const CLOCK_START: Span = Span::from_s(1);
@@ -62,8 +67,9 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
     let builder = PrmBuilder::new(&prm).and_then(|builder| {
         let builder = if slave.device.subscriber { Some(builder) } else { builder.user_81(&user_block(slave)) }?;
         let builder = if clocked { builder.iso_m(&iso_block(scenario, slave))? } else { builder };
-        let links = links_to(scenario, slave.address);
-        if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }
+        let (links, subscriptions) = tables_of(scenario, slave.address);
+        let builder = if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }?;
+        if subscriptions.is_empty() { Some(builder) } else { builder.dxb_subscriptions(&subscriptions) }
     });
     builder.expect("a checked scenario fits into Set_Prm").octets().to_vec()
 }
@@ -104,17 +110,21 @@ fn iso_block(scenario: &Scenario, slave: &Slave) -> IsoM {
     }
 }
 
-fn links_to(scenario: &Scenario, subscriber: Address) -> Vec<DxbLink> {
-    let links = scenario.links.iter().filter(|link| link.subscriber == subscriber);
-    let inputs = |publisher| scenario.slave(publisher).map_or(0, |slave| slave.device.inputs);
-    links
-        .map(|link| DxbLink {
-            publisher: link.publisher.get(),
-            length: inputs(link.publisher),
-            offset: link.offset,
-            sample: link.length,
-        })
-        .collect()
+/// The entries that `subscriber` gets: those of the link table and those of the subscriber table.
+fn tables_of(scenario: &Scenario, subscriber: Address) -> (Vec<DxbLink>, Vec<DxbSubscription>) {
+    let (mut links, mut subscriptions) = (Vec::new(), Vec::new());
+    for link in scenario.links.iter().filter(|link| link.subscriber == subscriber) {
+        let inputs = scenario.slave(link.publisher).map_or(0, |slave| slave.device.inputs);
+        let (publisher, length) = (link.publisher.get(), link.publisher_length.unwrap_or(inputs));
+        for sample in &link.samples {
+            let entry = DxbLink { publisher, length, offset: sample.offset, sample: sample.length };
+            match link.slot() {
+                None => links.push(entry),
+                Some(slot) => subscriptions.push(DxbSubscription { link: entry, slot, destination: sample.to }),
+            }
+        }
+    }
+    (links, subscriptions)
 }
 
 /// What the master knows of a slave beforehand.
@@ -155,6 +165,7 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
         powered_at: Time::ZERO + class1.powered_at,
     }));
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
+    sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
     let mut network = Network::new(scenario.bus.params.rate, sites, jitter, scenario.disturbances.clone());
     for event in &scenario.events {
@@ -178,7 +189,7 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         bus: scenario.bus.params,
         t_dp: master.t_dp,
         pace: master.pace,
-        shared: !scenario.class1.is_empty(),
+        shared: !scenario.class1.is_empty() || !scenario.class2.is_empty(),
         rearm: if master.accumulate { Rearm::LastSent } else { Rearm::Grid },
         dx_retries: master.dx_retries,
         lost_after: master.lost_after.min(u16::MAX.into()) as u16,
@@ -186,6 +197,7 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         active_spare: master.active_spare,
         data_control_time: data_control_time(master),
         auto_clear: master.services.auto_clear,
+        ms1_timeout: master.ms1_timeout,
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
     let life = LifeSettings { t_mapc: master.t_mapc, start: master.life_start, delay: master.life_delay };
@@ -210,6 +222,7 @@ fn further_master(scenario: &Scenario, class1: &Class1) -> Master<Controller> {
         active_spare: false,
         data_control_time: class1.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
         auto_clear: false,
+        ms1_timeout: scenario.master.ms1_timeout,
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
     let life = LifeSettings { t_mapc: 1, start: 1, delay: 0 };
@@ -230,7 +243,7 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let machine = if slave.silent {
         Node::Silent(slave.address)
     } else if slave.device.subscriber {
-        Node::Drive(Drive::new(&slave.device, settings, Subscriber::default()))
+        Node::Drive(Drive::new(&slave.device, settings, Subscriber::new(&slave.device, slave.address)))
     } else {
         Node::Encoder(Encoder::new(&slave.device, settings, Disc::new(&slave.device, &slave.options)))
     };
@@ -243,6 +256,39 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
         crystal: crystal(scenario.run.seed, slave.address, slave.crystal),
         shaft: Some((shaft, resolution.expect("a checked resolution"))),
         powered_at: Time::ZERO + slave.powered_at,
+    }
+}
+
+/// A class 2 master with its jobs.
+fn class2_site(scenario: &Scenario, class2: &scenario::Class2) -> Site<Node> {
+    let bus = scenario.bus.params;
+    let mut slaves: Vec<Address> = class2.jobs.iter().flat_map(|job| job.slaves.iter().copied()).collect();
+    slaves.sort_unstable();
+    slaves.dedup();
+    let jobs = class2.jobs.iter().flat_map(|job| {
+        let pairs = job.works.iter().flat_map(|work| job.slaves.iter().map(move |slave| (work, slave)));
+        pairs.map(|(work, slave)| tool::Job {
+            slave: slaves.binary_search(slave).expect("a slave of a job"),
+            work: work.clone(),
+            start: job.start,
+            period: job.period,
+        })
+    });
+    let jobs = jobs.collect();
+    let shortest = ms2::TIMEOUT_UNIT * i64::from(ms2::send_timeout(bus.rate));
+    let ms2 = client::Settings {
+        send_timeout: class2.send_timeout.unwrap_or(shortest).div_floor(ms2::TIMEOUT_UNIT) as u16,
+        response_timeout: class2.response_timeout,
+        profile_ident: unit::PROFILE_IDENT,
+    };
+    let settings =
+        class2::Settings { address: class2.address, bus, ms2, per_token: class2.per_token, slaves: slaves.clone() };
+    Site {
+        machine: Node::Class2(Class2::new(settings, Tool::new(slaves, jobs))),
+        place: Place::at(class2.position_mm),
+        crystal: crystal(scenario.run.seed, class2.address, class2.crystal),
+        shaft: None,
+        powered_at: Time::ZERO + class2.powered_at,
     }
 }
 
@@ -347,5 +393,34 @@ mod tests {
         assert_eq!((publisher[3], publisher[7]), (76, 0xE0), "min T_SDR is T_ID1, Publisher_Enable is set");
         let subscriber = set_prm(&four, &four.slaves[3]);
         assert_eq!(subscriber[10 + IsoM::LEN..], octets("09 03 00 00 01 06 0C 04 04"));
+    }
+
+    #[test]
+    fn a_subscriber_gets_both_tables_with_all_samples() {
+        let more = r#"
+            table = "subscriber"
+            [[link]]
+            publisher = 7
+            subscriber = 9
+            samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]
+            [[link]]
+            publisher = 7
+            subscriber = 9
+            table = "subscriber"
+            slot = 2
+            samples = [{ offset = 8, length = 4, to = 6 }, { offset = 2, length = 2 }]
+            [[link]]
+            publisher = 8
+            subscriber = 9
+            publisher_length = 10
+        "#;
+        let text = [THREE, LINK, more].concat().replace("375 us", "500 us");
+        let four = Scenario::parse("four", "four.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let subscriber = set_prm(&four, &four.slaves[3]);
+        let expected = octets(
+            "11 03 00 00 01 07 0C 04 04 07 0C 00 02 08 0A 04 04 \
+             17 07 00 00 01 06 0C 04 01 00 04 07 0C 08 02 06 04 07 0C 02 02 0A 02",
+        );
+        assert_eq!(subscriber[10 + IsoM::LEN..], expected);
     }
 }

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use super::acyclic::AcyclicCounts;
 use super::layout::Layout;
-use crate::observation::{ClockVerdict, Leds, Observation, Phase, PllState, SlaveState};
+use crate::observation::{ClockVerdict, Leds, LinkState, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -14,6 +15,10 @@ pub struct Counts {
     pub network: NetworkCounts,
     /// Per slave, in address order.
     pub slaves: Vec<SlaveCounts>,
+    /// Per link, in the order of the layout.
+    pub links: Vec<LinkCounts>,
+    /// Acyclic services, by the class of the master.
+    pub acyclic: AcyclicCounts,
 }
 
 /// What is counted for the network as a whole.
@@ -107,6 +112,37 @@ pub struct SlaveCounts {
     since: Time,
 }
 
+/// What is counted for one slave-to-slave link.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct LinkCounts {
+    /// Valid receptions.
+    pub valid: u64,
+    /// How often nothing came for the watchdog time (Model: D27).
+    pub lost: u64,
+    /// Data of another length than parameterised.
+    pub length_errors: u64,
+    /// Longest true time between two valid receptions; none before the second.
+    pub longest_gap: Option<Span>,
+    /// The last valid reception.
+    last: Option<Time>,
+}
+
+impl LinkCounts {
+    /// Counts what the subscriber observed of this link at `at`.
+    pub(super) fn observe(&mut self, at: Time, what: &Observation) {
+        match *what {
+            Observation::Subscribed { .. } => {
+                self.valid += 1;
+                let gap = self.last.replace(at).map(|last| at - last);
+                self.longest_gap = self.longest_gap.max(gap);
+            }
+            Observation::WrongLength { .. } => self.length_errors += 1,
+            Observation::Link { to: LinkState::Lost, .. } => self.lost += 1,
+            _ => {}
+        }
+    }
+}
+
 /// From the first SYNCH that a slave's clock recovery took to its lock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Lock {
@@ -120,7 +156,12 @@ impl Counts {
     /// Nothing counted yet.
     pub fn new(layout: &Layout) -> Self {
         let slaves = layout.slaves().iter().map(|slave| SlaveCounts::new(slave.address)).collect();
-        Self { network: NetworkCounts::default(), slaves }
+        Self {
+            network: NetworkCounts::default(),
+            slaves,
+            links: vec![LinkCounts::default(); layout.links().len()],
+            acyclic: AcyclicCounts::default(),
+        }
     }
 
     /// Counts what the master observed; `index` finds a slave.
@@ -158,6 +199,7 @@ impl Counts {
             Observation::Disturbed { .. } => self.network.disturbed += 1,
             _ => {}
         }
+        self.acyclic.station(what);
         self.network.events += u64::from(what.is_event());
     }
 

@@ -3,7 +3,7 @@
 use super::report::aligned;
 use super::scenario::suggestion;
 use crate::device::parameters::{PARAMETERS, Parameter};
-use crate::device::profile::{self, PROFILES, Profile};
+use crate::device::profile::{self, DxbLimits, PROFILES, Profile};
 use crate::time::{BitRate, Span};
 use crate::wire::parameter;
 
@@ -53,12 +53,12 @@ pub fn full(name: &str) -> Result<String, UnknownDevice> {
     lines.extend(aligned(&rates().collect::<Vec<_>>(), &[], &[max_tsdr(profile).collect()]));
 
     lines.push(String::new());
-    if profile.publisher {
+    if profile.subscriber {
+        lines.push("no acyclic parameters".to_owned());
+    } else {
         lines.push("acyclic parameters, all read-only (manual 4)".to_owned());
         let rows: Vec<_> = PARAMETERS.iter().flat_map(parameter_rows).collect();
         lines.extend(aligned(&["number", "name", "format"], &[0, 1, 2], &rows));
-    } else {
-        lines.push("no acyclic parameters".to_owned());
     }
     Ok(text(&lines))
 }
@@ -89,11 +89,19 @@ fn limits(profile: &Profile) -> Vec<String> {
 
 const fn function(profile: &Profile) -> &'static str {
     match (profile.publisher, profile.subscriber) {
-        (true, true) => "publisher, subscriber",
+        (true, true) => "publisher/subscriber",
         (true, false) => "publisher",
         (false, true) => "subscriber",
         (false, false) => "-",
     }
+}
+
+fn links(profile: &Profile) -> String {
+    if !profile.subscriber {
+        return "none, it does not subscribe".to_owned();
+    }
+    let DxbLimits { links, data, slots } = profile.dxb;
+    format!("up to {links}, samples up to {data} octets; subscriber table: slots 1 to {slots} of {data} octets")
 }
 
 /// What is known of a device, each with its words.
@@ -114,6 +122,7 @@ fn facts(profile: &Profile) -> Vec<(&'static str, String)> {
         ("T_PLL_W", format!("up to {window}; less than {} counts as this", profile.min_window)),
         ("resolution", format!("{} steps in a revolution, {} revolutions", profile.steps_per_rev, profile.revolutions)),
         ("function", function(profile).to_owned()),
+        ("links", links(profile)),
         ("empty Data_Exchange", if profile.fail_safe { "means Clear (Fail_Safe)" } else { "is refused" }.to_owned()),
         ("source", profile.source.to_string()),
     ]

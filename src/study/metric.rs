@@ -200,6 +200,13 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
     /// What the slave of number `index` observed.
     fn slave(&mut self, index: usize, stamp: &Stamp<'_>, what: &Observation) {
         self.counts.slaves[index].observe(stamp.at, self.counts.network.cycles, what);
+        if let Observation::Subscribed { publisher }
+        | Observation::WrongLength { publisher, .. }
+        | Observation::Link { publisher, .. } = *what
+            && let Some(link) = self.layout.link(publisher, stamp.station)
+        {
+            self.counts.links[link].observe(stamp.at, what);
+        }
         match *what {
             Observation::Latch { locked: true, .. } => self.latch(index, stamp.at),
             Observation::Subscribed { publisher } => self.subscribed(publisher, stamp),

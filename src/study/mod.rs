@@ -1,6 +1,7 @@
 //! Studies: scenario files, runs, what they record, and what is made of it. The only layer that knows files,
 //! threads and reports.
 
+pub mod acyclic;
 pub mod build;
 pub mod count;
 pub mod devices;

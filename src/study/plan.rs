@@ -243,7 +243,7 @@ mod tests {
         let mut network = network(BitRate::M1_5, find("simodrive-sensor-isochron").unwrap(), 1);
         let alone = Plan::of(&network).t_dx;
         let publisher = network.slaves[0].address;
-        network.links.push(Link { publisher, subscriber: Address::new(9).unwrap(), offset: 4, length: 4 });
+        network.links.push(Link::of(publisher, Address::new(9).unwrap(), 4, 4));
         assert_eq!(Plan::of(&network).t_dx - alone, BitRate::M1_5.span(Tbit(37 - 25)));
     }
 

@@ -1,6 +1,7 @@
 //! Report: the summary of a run as text that fits a screen.
 
-use super::summary::{Distribution, LedSummary, LinkSummary, SlaveSummary, Summary};
+use super::acyclic::AcyclicSummary;
+use super::summary::{Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, Summary};
 use crate::observation::Leds;
 use crate::time::Span;
 
@@ -17,6 +18,7 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     leds(summary, &mut lines);
     spread(summary, &mut lines);
     links(summary, &mut lines);
+    acyclic(summary, &mut lines);
     fingerprint(summary, &mut lines);
     files(summary, dir, &mut lines);
     lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
@@ -163,7 +165,19 @@ fn links(summary: &Summary, lines: &mut Vec<String>) {
         shown.truncate(LINKS);
         shown.sort_by_key(|link| (link.publisher, link.subscriber));
     }
-    let header = ["publish latency", "p50", "p90", "p99", "p99.9", "max", "age at use max"];
+    let header = [
+        "publish latency",
+        "p50",
+        "p90",
+        "p99",
+        "p99.9",
+        "max",
+        "age at use max",
+        "valid",
+        "lost",
+        "wrong length",
+        "longest gap",
+    ];
     let rows: Vec<_> = shown.iter().map(|link| link_cells(link)).collect();
     lines.push(String::new());
     lines.extend(aligned(&header, &[], &rows));
@@ -174,6 +188,8 @@ fn links(summary: &Summary, lines: &mut Vec<String>) {
 
 fn link_cells(link: &LinkSummary) -> Vec<String> {
     let publish = |value: fn(&Distribution) -> Option<Span>| span(link.distribution("publish").and_then(value));
+    let count =
+        |of: fn(&Receptions) -> u64| link.receptions.as_ref().map_or_else(|| "-".to_owned(), |all| of(all).to_string());
     vec![
         format!("{} -> {}", link.publisher, link.subscriber),
         publish(|latency| latency.p50),
@@ -182,7 +198,19 @@ fn link_cells(link: &LinkSummary) -> Vec<String> {
         publish(|latency| latency.p99_9),
         publish(|latency| latency.max),
         span(link.distribution("age").and_then(|age| age.max)),
+        count(|receptions| receptions.valid),
+        count(|receptions| receptions.lost),
+        count(|receptions| receptions.length_errors),
+        span(link.receptions.and_then(|receptions| receptions.longest_gap)),
     ]
+}
+
+/// Acyclic services, a line per class of master.
+fn acyclic(summary: &Summary, lines: &mut Vec<String>) {
+    if !summary.acyclic.is_empty() {
+        lines.push(String::new());
+        lines.extend(summary.acyclic.iter().map(AcyclicSummary::line));
+    }
 }
 
 fn fingerprint(summary: &Summary, lines: &mut Vec<String>) {
@@ -270,8 +298,8 @@ LEDs red dark, green dark at slave 3: no supply
 
 latch skew: p50 90 ns, p90 90 ns, p99 90 ns, p99.9 90 ns, max 90 ns, 0.250 steps
 
-publish latency     p50     p90     p99   p99.9     max  age at use max
-         3 -> 5  400 us  400 us  400 us  400 us  400 us          750 us
+publish latency     p50     p90     p99   p99.9     max  age at use max  valid  lost  wrong length  longest gap
+         3 -> 5  400 us  400 us  400 us  400 us  400 us          750 us      0     0             0            -
 
 fingerprint: wire 0123456789abcdef
 2 files in out/sample

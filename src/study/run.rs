@@ -152,7 +152,7 @@ pub fn run<Q: Queue<NetworkEvent>>(
     conclude(summary, &counts, sinks, bus.as_ref(), &fingerprints, dir)
 }
 
-/// Adds the fingerprints and the LEDs, then writes the files.
+/// Adds the fingerprints, the LEDs and the receptions, then writes the files.
 fn conclude(
     mut summary: Summary,
     counts: &Counts,
@@ -173,6 +173,8 @@ fn conclude(
     ];
     summary.fingerprint = texts.map(|(name, hash)| (name.to_owned(), format!("{hash:016x}"))).to_vec();
     summary.show_leds(counts);
+    summary.show_receptions(counts);
+    summary.show_acyclic(counts);
 
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {

@@ -114,6 +114,7 @@ pub(super) fn run() -> Summary {
     counts.finish(Time::ZERO + Span::from_s(10));
     let mut summary = Summary::new(facts, &counts, &histograms);
     summary.show_leds(&counts);
+    summary.show_receptions(&counts);
     summary.thinning = vec![Thinning::new("cycles.csv", 1_000, 3, 1)];
     summary.files = vec!["cycles.csv".to_owned(), "summary.json".to_owned()];
     summary

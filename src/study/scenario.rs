@@ -5,19 +5,24 @@
 //! and the rules of the bus and of the devices are checked on the whole. What is wrong on the way is collected
 //! into one [`ScenarioError`].
 
+mod acyclic;
 mod check;
 mod class1;
+mod class2;
 pub mod error;
 #[cfg(test)]
 mod faults;
 pub mod kinds;
+mod link;
 mod options;
 mod read;
 mod section;
 mod services;
 mod tree;
 
+pub use class2::{Class2, Class2Job};
 pub use error::{Fault, Position, Problem, ScenarioError};
+pub use link::{Link, Sample, Table};
 
 use crate::device::options::{Resolution, UnitOptions};
 use crate::device::profile::Device;
@@ -57,6 +62,8 @@ pub struct Scenario {
     pub class1: Vec<Class1>,
     /// The slaves in address order, which is the order of Data_Exchange (Model: D6).
     pub slaves: Vec<Slave>,
+    /// Class 2 masters in the order of the file.
+    pub class2: Vec<Class2>,
     /// Slave-to-slave links in the order of the file.
     pub links: Vec<Link>,
     /// Orders in the order of the file; at one instant this is the order in which they act.
@@ -260,6 +267,8 @@ pub struct Master {
     pub life_delay: u32,
     /// Whether further tokens to itself fill the spare time (Model: D6).
     pub active_spare: bool,
+    /// C1_Response_Timeout, after which an acyclic request over MS1 is given up; a multiple of 10 ms (GSD).
+    pub ms1_timeout: Span,
     /// How it watches and tells its slaves.
     pub services: MasterServices,
 }
@@ -377,19 +386,6 @@ pub struct Scaling {
     pub units_per_rev: u32,
     /// Total measuring range (counts), octets 20..=23 (manual 3.2.4).
     pub total_range: u32,
-}
-
-/// One slave-to-slave link (manual 3.4).
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Link {
-    /// Whose inputs.
-    pub publisher: Address,
-    /// Who takes them.
-    pub subscriber: Address,
-    /// Where the sample begins in the publisher's inputs (octets).
-    pub offset: u8,
-    /// Length of the sample (octets).
-    pub length: u8,
 }
 
 /// An order at an instant.
@@ -564,10 +560,12 @@ pub(crate) mod tests {
                 life_start: 1,
                 life_delay: 0,
                 active_spare: false,
+                ms1_timeout: Span::from_s(10),
                 services: MasterServices::default(),
             },
             class1: Vec::new(),
             slaves: (3..3 + n).map(slave).collect(),
+            class2: Vec::new(),
             links: Vec::new(),
             events: Vec::new(),
             disturbances: Vec::new(),

@@ -2,7 +2,8 @@
 
 use serde::{Serialize, Serializer};
 
-use super::count::{Counts, SlaveCounts};
+use super::acyclic::AcyclicSummary;
+use super::count::{Counts, LinkCounts, SlaveCounts};
 use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
@@ -29,6 +30,9 @@ pub struct Summary {
     pub slaves: Vec<SlaveSummary>,
     /// Per link, by publisher, then subscriber.
     pub links: Vec<LinkSummary>,
+    /// Acyclic services per class of master; none before [`Summary::show_acyclic`].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub acyclic: Vec<AcyclicSummary>,
     /// Name and text of each fingerprint.
     #[serde(serialize_with = "map")]
     pub fingerprint: Vec<(String, String)>,
@@ -250,9 +254,32 @@ pub struct LinkSummary {
     pub publisher: u8,
     /// Who takes them.
     pub subscriber: u8,
+    /// How often it worked and how often not; none before [`Summary::show_receptions`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub receptions: Option<Receptions>,
     /// Distributions of the link's quantities, by name.
     #[serde(serialize_with = "map")]
     pub distributions: Vec<(&'static str, Distribution)>,
+}
+
+/// What a subscriber got from one publisher.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct Receptions {
+    /// Valid receptions.
+    pub valid: u64,
+    /// How often nothing came for the watchdog time.
+    pub lost: u64,
+    /// Data of another length than parameterised.
+    pub length_errors: u64,
+    /// Longest true time between two valid receptions.
+    #[serde(rename = "longest_gap_ms", serialize_with = "ms_or_null")]
+    pub longest_gap: Option<Span>,
+}
+
+impl From<&LinkCounts> for Receptions {
+    fn from(&LinkCounts { valid, lost, length_errors, longest_gap, .. }: &LinkCounts) -> Self {
+        Self { valid, lost, length_errors, longest_gap }
+    }
 }
 
 /// A distribution in a few numbers. Percentiles have three significant digits, the rest is exact.
@@ -322,6 +349,7 @@ impl Summary {
         let link = |&(publisher, subscriber): &(Address, Address)| LinkSummary {
             publisher: publisher.get(),
             subscriber: subscriber.get(),
+            receptions: None,
             distributions: distributions(histograms, Subject::Link(publisher, subscriber)),
         };
         Self {
@@ -331,6 +359,7 @@ impl Summary {
             distributions: distributions(histograms, Subject::Network),
             slaves: (0..facts.slaves.len()).map(|index| slave(index, &facts, counts, histograms)).collect(),
             links: layout.links().iter().map(link).collect(),
+            acyclic: Vec::new(),
             network: Network {
                 scenario: facts.scenario,
                 bit_rate: facts.bit_rate.text(),
@@ -354,6 +383,19 @@ impl Summary {
         for (slave, counts) in self.slaves.iter_mut().zip(&counts.slaves) {
             slave.leds = Some(LedSummary::of(counts.leds));
         }
+    }
+
+    /// Adds what the subscribers received. What becomes of links is in the fingerprint of the states, and the latencies of
+    /// every reception are in that of the statistics, which therefore stays that of the latencies alone.
+    pub fn show_receptions(&mut self, counts: &Counts) {
+        for (link, counts) in self.links.iter_mut().zip(&counts.links) {
+            link.receptions = Some(counts.into());
+        }
+    }
+    /// Adds the acyclic services. All of them are on the line, whose hash is another fingerprint; the hash of all figures
+    /// stays comparable with that of runs before they were counted.
+    pub fn show_acyclic(&mut self, counts: &Counts) {
+        self.acyclic = AcyclicSummary::all(&counts.acyclic);
     }
 
     /// A distribution of the network by the name of its quantity.

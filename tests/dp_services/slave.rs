@@ -1,7 +1,8 @@
 //! The DP slave alone, with a device that does nothing but remember: which outputs are in force when, which inputs are
 //! read, when the master is asked to read the diagnosis.
 
-use isodp::dp::ms1::Records;
+use isodp::dp::ms1::{Access, Records};
+use isodp::dp::ms2;
 use isodp::dp::slave::{Application, Identity, Refusal, Slave};
 use isodp::fdl::{Heard, Outbox};
 use isodp::observation::{Observation, SlaveState};
@@ -38,12 +39,13 @@ struct Device {
     left: bool,
 }
 impl Records for Device {
-    fn read(&mut self, _record: Record, _out: &mut [u8]) -> Result<usize, ErrorCode> {
+    fn read(&mut self, _access: Access, _record: Record, _out: &mut [u8]) -> Result<usize, ErrorCode> {
         Err(ErrorCode::NOT_SUPPORTED)
     }
-    fn write(&mut self, _record: Record, _data: &[u8]) -> Result<(), ErrorCode> {
+    fn write(&mut self, _access: Access, _record: Record, _data: &[u8]) -> Result<(), ErrorCode> {
         Err(ErrorCode::NOT_SUPPORTED)
     }
+    fn closed(&mut self, _access: Access) {}
 }
 impl Application for Device {
     fn check(&self, _prm: &SetPrm<'_>) -> Result<(), Refusal> {
@@ -117,6 +119,7 @@ impl Bench {
             max_diag: 16,
             rate: BitRate::M12,
             t_sdr: Tbit(30),
+            ms2: ms2::Settings { connections: 0, send_timeout: 100, working: Span::ZERO, profile_ident: 0 },
         };
         let slave = Slave::new(identity);
         let mut bench = Self { slave, device: Device::default(), now: Local::ZERO, fcb: false, out: Outbox::new() };

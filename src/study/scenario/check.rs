@@ -2,12 +2,15 @@
 //! numbers, and the nearest right value.
 
 use super::class1;
+use super::class2;
 use super::error::Fault;
 use super::kinds::jitter_bound;
 use super::section::Reader;
 use super::services;
 use super::tree::Place;
-use super::{Action, Bus, Class1, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Scenario, Slave, When};
+use super::{
+    Action, Bus, Class1, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Sample, Scenario, Slave, When,
+};
 use crate::device::options::Resolution;
 use crate::dp::master::Pace;
 use crate::sim::motion;
@@ -31,6 +34,7 @@ pub(super) struct Facts<'a> {
 /// before found nothing.
 const STAGES: &[(&[Rule], &[Rule])] = &[
     (&[], &[some_slave, own_addresses, class1::stations, addresses_within_hsa, positions, crystals, run_length]),
+    (&[], &[class2::own_addresses, class2::positions, class2::slaves]),
     (&[isochronous_rate], &[bus_parameters, device_max_tsdr, own_t_sdr]),
     (&[t_dp_limits, t_dp_grid, t_dp_content], &[t_mapc, watchdog_outlasts_t_dp]),
     (&[services::slave_interval], &[services::data_control_time, services::sync_and_freeze]),
@@ -39,14 +43,13 @@ const STAGES: &[(&[Rule], &[Rule])] = &[
     (&[quantum], &[]),
     (&[jitter_fits], &[functions, code_sequence, units_per_rev, total_range, cycles_fit]),
     (&[], &[publishers, subscribers, samples, link_counts, link_watchdog]),
+    (&[], &[sample_lengths, destinations, told_lengths]),
     (&[], &[event_stations, class1::event_stations, event_instants, disturbance_stations, services::commands]),
     (&[start_up], &[]),
 ];
 
 /// Largest offset of a crystal. Model: twice what cheap ones have over temperature and age.
 const CRYSTAL_MAX_PPB: i64 = 200_000;
-/// Most links of a subscriber (VPC3+C manual).
-const LINKS_MAX: usize = 29;
 
 /// Checks `scenario` stage by stage until one complains.
 pub(super) fn check(scenario: &Scenario, reader: &mut Reader<'_>) -> Vec<super::error::Problem> {
@@ -563,10 +566,10 @@ fn subscribers(facts: &Facts<'_>, reader: &mut Reader<'_>) {
             Some(slave) if !slave.device.subscriber => Fault::new(format!("slave {} cannot subscribe", slave.address))
                 .rule(format!("{} has no subscriber function (its profile, manual 3.4)", slave.device.name))
                 .help("subscriber-drive can"),
-            Some(_) if earlier.iter().any(|e| (e.publisher, e.subscriber) == (link.publisher, link.subscriber)) => {
+            Some(_) if earlier.iter().any(|e| is_pair(e, link) && e.table == link.table) => {
                 Fault::new(format!("slave {} has this publisher already", link.subscriber))
-                    .rule("one link per publisher and subscriber (Model: D26 counts latencies by this pair)")
-                    .help("one link whose sample holds both")
+                    .rule("one link per publisher, subscriber and table (Model: D26 counts latencies by the pair)")
+                    .help("one link with both: samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]")
             }
             Some(_) => continue,
         };
@@ -587,31 +590,126 @@ fn no_slave(facts: &Facts<'_>, address: Address) -> Fault {
     Fault::new(message).help(format!("the slaves are {}", all.join(", ")))
 }
 
-fn samples(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+/// Whether two links are of the same publisher and subscriber.
+fn is_pair(one: &Link, other: &Link) -> bool {
+    (one.publisher, one.subscriber) == (other.publisher, other.subscriber)
+}
+
+/// Every sample with the path of its keys.
+fn all_samples<'a>(facts: &Facts<'a>, reader: &Reader<'_>) -> Vec<(String, &'a Link, Sample)> {
+    let mut all = Vec::new();
     for (path, link) in links(facts) {
-        let Some(publisher) = facts.scenario.slave(link.publisher) else { continue };
-        let (offset, length, inputs) = (u32::from(link.offset), u32::from(link.length), publisher.device.inputs);
+        let listed = reader.place(&[&format!("{path}.samples")]) != Place::Missing;
+        for (i, &sample) in link.samples.iter().enumerate() {
+            all.push((if listed { format!("{path}.samples.{}", i + 1) } else { path.clone() }, link, sample));
+        }
+    }
+    all
+}
+
+/// Length of the publisher's data as Set_Prm says it, and who says so.
+fn told_length<'a>(facts: &Facts<'a>, link: &Link) -> Option<(u8, &'a str)> {
+    let publisher = facts.scenario.slave(link.publisher)?;
+    Some(
+        link.publisher_length
+            .map_or((publisher.device.inputs, &*publisher.device.name), |told| (told, "publisher_length")),
+    )
+}
+
+fn samples(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (path, link, sample) in all_samples(facts, reader) {
+        let Some((inputs, whose)) = told_length(facts, link) else { continue };
+        let (offset, length) = (u32::from(sample.offset), u32::from(sample.length));
         if length == 0 || offset + length > u32::from(inputs) {
             let fault = Fault::new(format!(
                 "a sample of {length} octets from octet {offset} on is not in the publisher's data"
             ))
             .rule(format!(
-                "length >= 1 and offset {offset} + length {length} <= {inputs} octets of {} (DXB link table)",
-                publisher.device.name
+                "length >= 1 and offset {offset} + length {length} <= {inputs} octets of {whose} (DXB link table)"
             ))
             .help("offset = 4, length = 4 is G1_XIST1 of telegram 81");
-            about(reader, &format!("{path}.length"), &[&format!("{path}.offset"), &format!("{path}.publisher")], fault);
+            let publisher = format!("link.{}.publisher", number_of(&path));
+            about(reader, &format!("{path}.length"), &[&format!("{path}.offset"), &publisher], fault);
+        }
+    }
+}
+
+/// The number of the link that `path` belongs to.
+fn number_of(path: &str) -> &str {
+    path.split('.').nth(1).unwrap_or_default()
+}
+
+fn sample_lengths(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (path, link, sample) in all_samples(facts, reader) {
+        let Some(subscriber) = facts.scenario.slave(link.subscriber) else { continue };
+        let longest = subscriber.device.dxb.data;
+        if sample.length > longest {
+            let fault = Fault::new(format!("slave {} takes no sample of {} octets", link.subscriber, sample.length))
+                .rule(format!("length <= {longest} octets of {} (DXB_Max_Data_Length)", subscriber.device.name));
+            about(reader, &format!("{path}.length"), &[], fault);
+        }
+    }
+}
+
+/// Where the samples of the subscriber table go.
+fn destinations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let mut taken: Vec<(Address, u8, std::ops::Range<u16>)> = Vec::new();
+    for (path, link, sample) in all_samples(facts, reader) {
+        let (Some(slot), Some(subscriber)) = (link.slot(), facts.scenario.slave(link.subscriber)) else { continue };
+        let (limits, name) = (subscriber.device.dxb, &subscriber.device.name);
+        let to = u16::from(sample.to)..u16::from(sample.to) + u16::from(sample.length);
+        if slot > limits.slots {
+            let fault = Fault::new(format!("slave {} has no slot {slot} for samples", link.subscriber))
+                .rule(format!("slot 1 to {} of {name} (its profile)", limits.slots));
+            about(reader, &format!("link.{}.slot", number_of(&path)), &[], fault);
+        } else if to.end > limits.data.into() {
+            let fault = Fault::new(format!(
+                "{} octets from octet {} on are not in the slot's data area",
+                sample.length, to.start
+            ))
+            .rule(format!("to + length <= {} octets of {name} (its profile)", limits.data));
+            about(reader, &format!("{path}.to"), &[&format!("{path}.length")], fault);
+        } else if let Some((.., other)) = taken.iter().find(|(station, number, other)| {
+            (*station, *number) == (link.subscriber, slot) && other.start < to.end && to.start < other.end
+        }) {
+            let fault =
+                Fault::new(format!("octets {} to {} of slot {slot} are taken already", other.start, other.end - 1))
+                    .rule(format!(
+                        "no two samples of slave {} go to the same octet (Model: its slots)",
+                        link.subscriber
+                    ))
+                    .help(format!("for example to = {}", other.end));
+            let publisher = format!("link.{}.publisher", number_of(&path));
+            about(reader, &format!("{path}.to"), &[&format!("{path}.offset"), &publisher], fault);
+        }
+        taken.push((link.subscriber, slot, to));
+    }
+}
+
+/// A publisher's data have one length, and its subscriber knows one.
+fn told_lengths(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (i, (path, link)) in links(facts).enumerate() {
+        let Some((told, _)) = told_length(facts, link) else { continue };
+        let others = facts.scenario.links[..i].iter().filter(|other| is_pair(other, link));
+        let other = others.filter_map(|other| told_length(facts, other)).find(|&(other, _)| other != told);
+        if let Some((other, _)) = other {
+            let fault = Fault::new(format!("slave {} would know two lengths of its publisher's data", link.subscriber))
+                .rule("all links of a pair say the same publisher_length (Model: a publisher has one)")
+                .help(format!("publisher_length = {other} here too"));
+            about(reader, &format!("{path}.publisher_length"), &[&format!("{path}.publisher")], fault);
         }
     }
 }
 
 fn link_counts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for slave in facts.scenario.configured() {
-        let mut own = links(facts).filter(|(_, link)| link.subscriber == slave.address);
-        if let Some((path, _)) = own.nth(LINKS_MAX) {
-            let fault = Fault::new(format!("slave {} has more than {LINKS_MAX} links", slave.address))
-                .rule(format!("a subscriber has up to {LINKS_MAX} links (VPC3+C manual)"));
-            about(reader, &format!("{path}.subscriber"), &[], fault);
+        let most = usize::from(slave.device.dxb.links);
+        let all = all_samples(facts, reader);
+        let mut own = all.iter().filter(|(_, link, _)| link.subscriber == slave.address);
+        if let Some((path, ..)) = own.nth(most) {
+            let fault = Fault::new(format!("slave {} has more than {most} links", slave.address))
+                .rule(format!("a subscriber has up to {most} links, each sample is one (DXB_Max_Link_Count)"));
+            about(reader, &format!("link.{}.subscriber", number_of(path)), &[], fault);
         }
     }
 }

@@ -54,7 +54,9 @@ impl Scenario {
     }
     /// Whether a station has this address.
     fn has_station(&self, address: Address) -> bool {
-        address == self.master.address || self.class1(address).is_some() || self.slave(address).is_some()
+        let further = self.class1.iter().map(|class1| class1.address);
+        let mut masters = further.chain(self.class2.iter().map(|class2| class2.address));
+        address == self.master.address || self.slave(address).is_some() || masters.any(|other| other == address)
     }
     fn masters(&self) -> impl Iterator<Item = (String, Address)> {
         let further = self.class1.iter().enumerate();
@@ -135,7 +137,8 @@ pub(super) fn stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let masters: Vec<_> = scenario.masters().collect();
     for (i, (path, address)) in masters.iter().enumerate().skip(1) {
         let taken = masters[..i].iter().any(|(_, other)| other == address);
-        if taken || scenario.slave(*address).is_some() {
+        let class2 = scenario.class2.iter().any(|class2| class2.address == *address);
+        if taken || class2 || scenario.slave(*address).is_some() {
             let fault = Fault::new(format!("another station has the address {address}"))
                 .rule("every station of a bus has an address of its own (EN 50170-2)");
             about(reader, &format!("{path}.address"), &[], fault);

@@ -584,8 +584,8 @@ good.toml:34:10: link.1.length: a sample of 4 octets from octet 10 on is not in 
 good.toml:37:14: link.2.subscriber: slave 11 has this publisher already
   37 | subscriber = 11
      |              ^^
-  rule: one link per publisher and subscriber (Model: D26 counts latencies by this pair)
-  help: one link whose sample holds both
+  rule: one link per publisher, subscriber and table (Model: D26 counts latencies by the pair)
+  help: one link with both: samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]
 ",
         ),
     ]);
@@ -808,6 +808,74 @@ fn rules_without_a_place_of_their_own() {
     assert!(text.contains("event.1.cycle: the run is over before this event"), "{text}");
 }
 
+/// The good file with these lines behind its link.
+fn linked(lines: &str) -> Result<Scenario, ScenarioError> {
+    parse(&GOOD.replace("subscriber = 11", &format!("subscriber = 11\n{lines}")), &[])
+}
+
+#[test]
+fn samples_tables_and_places_of_links() {
+    let samples = "samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]";
+    let found = linked(samples).unwrap_or_else(|error| panic!("{error}")).links[0].clone();
+    let sample = |offset, length, to| Sample { offset, length, to };
+    assert_eq!((found.table, found.samples), (Table::Link, vec![sample(4, 4, 0), sample(0, 2, 0)]));
+    let lines = format!("table = \"subscriber\"\nslot = 2\npublisher_length = 9\n{samples}");
+    let found = linked(&lines).unwrap_or_else(|error| panic!("{error}")).links[0].clone();
+    assert_eq!((found.slot(), found.publisher_length), (Some(2), Some(9)));
+    assert_eq!(found.samples, [sample(4, 4, 0), sample(0, 2, 4)], "one behind the other");
+    let other = "table = \"subscriber\"\nto = 7\n[[link]]\npublisher = 3\nsubscriber = 11";
+    let found = linked(other).unwrap_or_else(|error| panic!("{error}")).links;
+    assert_eq!(
+        (found[0].slot(), found[0].samples[0].to, found[1].table),
+        (Some(1), 7, Table::Link),
+        "one in each table"
+    );
+}
+
+#[test]
+fn samples_tables_and_places_that_cannot_be() {
+    let subscriber = "table = \"subscriber\"";
+    let cases = [
+        ("samples = []", "link.1.samples: a link has a sample at least"),
+        ("samples = 4", "link.1.samples: this is a number"),
+        ("samples = [4]", "link.1.samples: a sample is a table"),
+        ("samples = [{ offset = 4 }]", "link.1.samples.1.length: this key is missing"),
+        ("samples = [{ offset = 4, length = 4, at = 1 }]", "link.1.samples.1.at: there is no such key"),
+        ("offset = 4\nsamples = [{ offset = 4, length = 4 }]", "link.1: a link has either samples or offset"),
+        (
+            "samples = [{ offset = 0, length = 4 }, { offset = 10, length = 4 }]",
+            "link.1.samples.2.length: a sample of 4",
+        ),
+        ("length = 0", "link.1.length: a sample of 0 octets"),
+        ("publisher_length = 7", "offset 4 + length 4 <= 7 octets of publisher_length"),
+        ("publisher_length = 0", "link.1.publisher_length: 0 is out of range"),
+        ("publisher_length = 245", "link.1.publisher_length: 245 is out of range"),
+        ("table = \"links\"", "link.1.table: there is no table \"links\""),
+        ("slot = 1", "link.1: the link table has no slot"),
+        ("to = 1", "link.1: the link table has no to"),
+        ("samples = [{ offset = 4, length = 4, to = 1 }]", "the link table has no to"),
+        ("table = \"subscriber\"\nslot = 3", "link.1.slot: slave 11 has no slot 3 for samples"),
+        ("table = \"subscriber\"\nslot = 0", "link.1.slot: 0 is out of range"),
+        ("table = \"subscriber\"\nto = 241", "link.1.to: 4 octets from octet 241 on are not in the slot's data area"),
+        (
+            "table = \"subscriber\"\nsamples = [{ offset = 4, length = 4 }, { offset = 4, length = 4, to = 3 }]",
+            "link.1.samples.2.to: octets 0 to 3 of slot 1 are taken already",
+        ),
+        (
+            "publisher_length = 11\n[[link]]\npublisher = 3\nsubscriber = 11\ntable = \"subscriber\"",
+            "link.2.publisher_length: slave 11 would know two lengths of its publisher's data",
+        ),
+    ];
+    for (lines, expected) in cases {
+        let said = linked(lines).map(|scenario| scenario.links).unwrap_err().to_string();
+        assert!(said.contains(expected), "{lines}\n{said}");
+    }
+    let second = format!("{subscriber}\n[[link]]\npublisher = 4\nsubscriber = 11\n{subscriber}");
+    let said = linked(&second).map(|scenario| scenario.links).unwrap_err().to_string();
+    assert!(said.contains("link.2.to: octets 0 to 3 of slot 1 are taken already"), "{said}");
+    assert!(said.contains("for example to = 4"), "{said}");
+}
+
 #[test]
 fn a_subscriber_has_at_most_29_links() {
     let link = |i| format!("[[link]]\npublisher = {}\nsubscriber = 100\n", i + 3);
@@ -835,7 +903,7 @@ fn a_good_file_becomes_a_scenario() {
     assert_eq!(scenario.slaves[0].crystal, Crystal::Within(50_000));
     assert_eq!(scenario.slaves[0].motion, Motion::Speed { start: Angle::ZERO, micro_rpm: 1_500_000_000 });
     let (publisher, subscriber) = (address(3), address(11));
-    assert_eq!(scenario.links, [Link { publisher, subscriber, offset: 4, length: 4 }]);
+    assert_eq!(scenario.links, [Link::of(publisher, subscriber, 4, 4)]);
     let action = Action::HoldLifeSign { cycles: Some(2) };
     assert_eq!(scenario.events, [Event { when: When::Time(Span::from_s(1)), slaves: vec![publisher], action }]);
     let bursts = Bursts { from_cycle: 1_000, count: 1, every: Some(100) };

@@ -1,15 +1,18 @@
 //! The tree of a scenario becomes a [`Scenario`], table by table and key by key.
 
+use super::acyclic;
 use super::class1;
+use super::class2;
 use super::error::Fault;
 use super::kinds::{self, ACTIONS, DISTURBANCES, Kind, address};
+use super::link::link;
 use super::options;
 use super::section::{Reader, Section, choice, cycle_time, instant, number, quantity, suggestion, text, yes};
 use super::services;
 use super::tree::{Node, Place, Table, Value};
 use super::{
-    Action, Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Link, Master, Record, Run,
-    Scaling, Scenario, Slave, Watchdog, When,
+    Action, Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Master, Record, Run, Scaling,
+    Scenario, Slave, Watchdog, When,
 };
 use crate::device::profile::{Device, PROFILES, Profile};
 use crate::dp::master::Pace;
@@ -22,7 +25,8 @@ use crate::time::{BitRate, Span, Tbit};
 use crate::wire::Address;
 
 /// The tables of a file; the second half is lists, `[[slave]]`.
-const TABLES: [&str; 9] = ["run", "bus", "master", "record", "slave", "class1", "link", "event", "disturbance"];
+const TABLES: [&str; 10] =
+    ["run", "bus", "master", "record", "slave", "class1", "class2", "link", "event", "disturbance"];
 /// How many of [`TABLES`] are single tables.
 const SINGLE: usize = 4;
 
@@ -56,6 +60,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
     }
     let addresses: Vec<_> = slave_tables.iter().map(|table| table.address).collect();
     let class1 = list(reader, &root, "class1", class1::read);
+    let class2 = list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses));
     let links = list(reader, &root, "link", link);
     let events = list(reader, &root, "event", |section, reader| event(section, reader, &addresses));
     let disturbances = list(reader, &root, "disturbance", disturbance);
@@ -68,6 +73,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         master: master?,
         class1,
         slaves,
+        class2,
         links,
         events,
         disturbances,
@@ -338,6 +344,7 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
     let life_start = s.optional(reader, "life_start", number(1..=15)).unwrap_or(1);
     let life_delay = s.optional(reader, "life_delay", number(0..=u32::MAX)).unwrap_or(0);
     let active_spare = s.optional(reader, "active_spare", yes).unwrap_or(false);
+    let ms1_timeout = s.optional(reader, "ms1_timeout", acyclic::timeout).unwrap_or(acyclic::RESPONSE_TIMEOUT);
     let services = services::master(s, reader);
     section.finish(reader);
     let (address, t_dp) = (address?, t_dp?);
@@ -359,6 +366,7 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
         life_start,
         life_delay,
         active_spare,
+        ms1_timeout,
         services,
     };
     Some((master, times))
@@ -537,17 +545,6 @@ fn scaling(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Scaling>
     Some(Scaling { units_per_rev: units_per_rev?, total_range: total_range? })
 }
 
-/// Reads one `[[link]]`.
-fn link(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Link> {
-    let publisher = section.required(reader, "publisher", "3", address);
-    let subscriber = section.required(reader, "subscriber", "11", address);
-    // G1_XIST1 of telegram 81 (manual 2.2).
-    let offset = section.optional(reader, "offset", number(0..=u8::MAX)).unwrap_or(4);
-    let length = section.optional(reader, "length", number(0..=u8::MAX)).unwrap_or(4);
-    section.finish(reader);
-    Some(Link { publisher: publisher?, subscriber: subscriber?, offset, length })
-}
-
 /// Reads one `[[event]]`; `all` are the addresses of all slaves.
 fn event(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> Option<Event> {
     let s = &mut section;
@@ -562,7 +559,7 @@ fn event(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> 
     let slaves = if power && s.has("station") {
         s.optional(reader, "station", address).map(|station| vec![station])
     } else if action.about_slaves() {
-        Some(targets(reader, s, all))
+        Some(targets("event", reader, s, all))
     } else {
         None
     };
@@ -572,14 +569,14 @@ fn event(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> 
 }
 
 /// The slaves that an event is about.
-fn targets(reader: &mut Reader<'_>, section: &mut Section<'_>, all: &[Address]) -> Vec<Address> {
+pub(super) fn targets(noun: &str, reader: &mut Reader<'_>, section: &mut Section<'_>, all: &[Address]) -> Vec<Address> {
     let one = section.optional(reader, "slave", address);
     let many = section.optional(reader, "slaves", |node| match &node.value {
         Value::Text(text) if text.trim() == "all" => Ok(all.to_vec()),
         _ => address_list(node),
     });
     if section.has("slave") == section.has("slaves") {
-        let fault = Fault::new("this event needs either slave or slaves");
+        let fault = Fault::new(format!("this {noun} needs either slave or slaves"));
         section.complain(reader, fault.help("for example: slave = 3, slaves = \"3..10\", or slaves = \"all\""));
     }
     one.into_iter().chain(many.into_iter().flatten()).collect()
