@@ -824,31 +824,22 @@ impl fmt::Display for Observation {
             Self::Retry { slave } => write!(f, "slave {slave}: request repeated"),
             Self::NoAnswer { slave } => write!(f, "slave {slave}: no answer"),
             Self::IllegalAnswer { slave } => write!(f, "slave {slave}: illegal answer"),
-            Self::Diagnosis { slave, status: [a, b, c] } => {
-                write!(f, "slave {slave}: diagnosis {a:02X} {b:02X} {c:02X}")
-            }
-            Self::ExtendedDiagnosis { slave, length, first } => {
-                write!(f, "slave {slave}: extended diagnosis of {length} octets")?;
-                let shown = usize::from(*length).min(first.len());
-                first[..shown]
-                    .iter()
-                    .enumerate()
-                    .try_for_each(|(i, octet)| write!(f, "{}{octet:02X}", if i == 0 { ": " } else { " " }))?;
-                if shown < usize::from(*length) { f.write_str(" ...") } else { Ok(()) }
-            }
-            Self::DiagnosisDue { slave } => write!(f, "slave {slave}: reply of high priority, its diagnosis is due"),
-            Self::Control { octets: [command, groups] } => write!(f, "Global_Control {command:02X} {groups:02X}"),
-            Self::AutoClear { slave } => write!(f, "slave {slave}: no Data_Exchange for Data_Control_Time, AutoClear"),
+            Self::Diagnosis { .. }
+            | Self::ExtendedDiagnosis { .. }
+            | Self::DiagnosisDue { .. }
+            | Self::Control { .. }
+            | Self::AutoClear { .. }
+            | Self::Held { .. } => self.fmt_services(f),
             Self::Gap { address, answer } => write!(f, "GAP {address}: {answer}"),
             Self::TokenClaimed => f.write_str("token claimed"),
-            Self::TokenReceived { t_rr, t_th } => write!(f, "token received after T_RR {t_rr}, T_TH {t_th}"),
-            Self::TokenRetry { to } => write!(f, "token to {to} repeated"),
-            Self::TokenDropped { why } => write!(f, "token given up: {why}"),
-            Self::RingEntered => f.write_str("entered the ring"),
-            Self::RingLeft { why } => write!(f, "left the ring: {why}"),
-            Self::AddressConflict => f.write_str("another station has this address, offline"),
-            Self::StationJoined { station } => write!(f, "station {station} joins the ring"),
-            Self::StationLost { station } => write!(f, "station {station} took no token and leaves the ring"),
+            Self::TokenReceived { .. }
+            | Self::TokenRetry { .. }
+            | Self::TokenDropped { .. }
+            | Self::RingEntered
+            | Self::RingLeft { .. }
+            | Self::AddressConflict
+            | Self::StationJoined { .. }
+            | Self::StationLost { .. } => self.fmt_ring(f),
             Self::SlaveLife { slave, from, to, tripped } => {
                 write!(f, "slave {slave}: its sign of life {from} -> {to}{}", if *tripped { ", FAULT" } else { "" })
             }
@@ -863,10 +854,6 @@ impl fmt::Display for Observation {
             | Self::AcyclicDone { .. }
             | Self::Connection { .. } => self.fmt_acyclic(f),
             Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
-            Self::Held { outputs, inputs } => {
-                let word = |on: bool| if on { "on" } else { "off" };
-                write!(f, "Sync mode {}, Freeze mode {}", word(*outputs), word(*inputs))
-            }
             Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
             Self::Clock { .. } | Self::Latch { .. } | Self::SetPoint { .. } => self.fmt_clock(f),
             Self::Pll { from, to } => write!(f, "PLL {from} -> {to}"),
@@ -883,6 +870,48 @@ impl fmt::Display for Observation {
             Self::Link { publisher, from, to } => write!(f, "link to {publisher}: {from} -> {to}"),
             Self::Collision { with } => write!(f, "collision with {with}"),
             Self::Disturbed { how } => write!(f, "disturbed: {how}"),
+        }
+    }
+}
+
+impl Observation {
+    /// What DP services do beside Data_Exchange, as text; nothing for anything else.
+    fn fmt_services(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Diagnosis { slave, status: [a, b, c] } => {
+                write!(f, "slave {slave}: diagnosis {a:02X} {b:02X} {c:02X}")
+            }
+            Self::ExtendedDiagnosis { slave, length, first } => {
+                write!(f, "slave {slave}: extended diagnosis of {length} octets")?;
+                let shown = usize::from(*length).min(first.len());
+                if shown > 0 {
+                    f.write_str(":")?;
+                }
+                first[..shown].iter().try_for_each(|octet| write!(f, " {octet:02X}"))?;
+                if shown < usize::from(*length) { f.write_str(" ...") } else { Ok(()) }
+            }
+            Self::DiagnosisDue { slave } => write!(f, "slave {slave}: reply of high priority, its diagnosis is due"),
+            Self::Control { octets: [command, groups] } => write!(f, "Global_Control {command:02X} {groups:02X}"),
+            Self::AutoClear { slave } => write!(f, "slave {slave}: no Data_Exchange for Data_Control_Time, AutoClear"),
+            Self::Held { outputs, inputs } => {
+                let word = |on: bool| if on { "on" } else { "off" };
+                write!(f, "Sync mode {}, Freeze mode {}", word(*outputs), word(*inputs))
+            }
+            _ => Ok(()),
+        }
+    }
+    /// What happens in the token ring, as text; nothing for anything else.
+    fn fmt_ring(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TokenReceived { t_rr, t_th } => write!(f, "token received after T_RR {t_rr}, T_TH {t_th}"),
+            Self::TokenRetry { to } => write!(f, "token to {to} repeated"),
+            Self::TokenDropped { why } => write!(f, "token given up: {why}"),
+            Self::RingEntered => f.write_str("entered the ring"),
+            Self::RingLeft { why } => write!(f, "left the ring: {why}"),
+            Self::AddressConflict => f.write_str("another station has this address, offline"),
+            Self::StationJoined { station } => write!(f, "station {station} joins the ring"),
+            Self::StationLost { station } => write!(f, "station {station} took no token and leaves the ring"),
+            _ => Ok(()),
         }
     }
 }

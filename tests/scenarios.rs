@@ -51,8 +51,9 @@ fn every_shipped_scenario_has_a_test_and_says_what_it_asks() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     let files = std::fs::read_dir(directory).expect("the scenarios").map(|entry| entry.expect("a file").path());
     let names: BTreeSet<_> = files.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect();
-    let tested =
-        || TESTS.iter().chain(crate::encoder_scenarios::TESTS).chain(crate::dxb::TESTS).chain(crate::ring::TESTS);
+    let tables =
+        [TESTS, crate::encoder_scenarios::TESTS, crate::dp_services::TESTS, crate::dxb::TESTS, crate::ring::TESTS];
+    let tested = || tables.into_iter().flatten();
     assert_eq!(names, tested().map(|(name, _)| format!("{name}.toml")).collect());
     for &(name, _) in tested() {
         let question = scenario(name, &[]).question;

@@ -69,3 +69,89 @@ impl Supervision {
         now - last >= self.data_control_time
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dp::handler::{Answer, SlaveParams};
+    use crate::fdl::Outbox;
+    use crate::wire::Address;
+
+    const T_DP: Span = Span::from_ms(1);
+    const TIME: Span = Span::from_ms(20);
+
+    /// Two slaves, of which so many exchange data since time 0.
+    fn handlers(exchanging: usize) -> [Handler; 2] {
+        let params = |address| SlaveParams {
+            address: Address::new(address).unwrap(),
+            prm: alloc::vec![1],
+            cfg: alloc::vec![2],
+            outputs: 4,
+            inputs: 12,
+            publisher: false,
+            fail_safe: true,
+            get_cfg: false,
+            max_diag: 6,
+            min_interval: Span::ZERO,
+        };
+        let mut handlers = [3, 4].map(|address| Handler::new(params(address)));
+        let ready = Answer::Data(&[0x00, 0x0C, 0x00, 0x02, 0x80, 0xF9]);
+        for handler in &mut handlers[..exchanging] {
+            for answer in [ready, Answer::Acknowledged, Answer::Acknowledged, ready] {
+                handler.answered(answer, &mut Outbox::new());
+            }
+            handler.exchanged(Local::ZERO, false, &mut Outbox::new());
+            assert!(handler.exchanges());
+        }
+        handlers
+    }
+    fn at(cycle: u64) -> Local {
+        Local::ZERO + T_DP * cycle as i64
+    }
+
+    #[test]
+    fn operate_comes_after_its_cycles_and_with_the_flag_after_the_last_slave() {
+        use MasterMode::{Clear, Operate};
+        for (auto_clear, exchanging, expected) in
+            [(false, 0, Operate), (false, 2, Operate), (true, 1, Clear), (true, 2, Operate)]
+        {
+            let mut supervision = Supervision::new(auto_clear, TIME, 3);
+            let handlers = handlers(exchanging);
+            for cycle in 0..6 {
+                let mode = supervision.cycle(at(cycle), cycle, Clear, &handlers).0;
+                // Once it came, a mode is ordered and kept.
+                let due = cycle == 3 || (cycle > 3 && expected == Clear);
+                assert_eq!(mode, if due { expected } else { Clear }, "{auto_clear} {exchanging} cycle {cycle}");
+            }
+            supervision.restart();
+            assert_eq!(supervision.cycle(at(9), 9, Clear, &handlers).0, expected);
+        }
+    }
+
+    #[test]
+    fn an_ordered_clear_is_not_undone_once_all_exchange_data() {
+        let mut supervision = Supervision::new(true, TIME, 0);
+        supervision.ordered();
+        assert_eq!(supervision.cycle(at(0), 0, MasterMode::Clear, &handlers(2)).0, MasterMode::Clear);
+    }
+
+    #[test]
+    fn a_slave_that_is_gone_for_the_time_brings_clear_for_good() {
+        use MasterMode::{Clear, Operate};
+        let mut all = handlers(2);
+        for (auto_clear, expected) in [(false, (Operate, None)), (true, (Clear, Some(1)))] {
+            let mut supervision = Supervision::new(auto_clear, TIME, 0);
+            assert_eq!(supervision.cycle(at(0), 0, Clear, &all), (Operate, None));
+            assert_eq!(supervision.cycle(at(19), 19, Operate, &all), (Operate, None));
+            all[0].exchanged(at(19), false, &mut Outbox::new());
+            assert_eq!(supervision.cycle(at(20), 20, Operate, &all), expected);
+            if auto_clear {
+                assert_eq!(supervision.cycle(at(21), 21, Clear, &all), (Clear, None), "both exchange data, no order");
+                // Ordered back, the time begins anew.
+                for (cycle, mode) in [(22, Operate), (40, Operate), (41, Clear)] {
+                    assert_eq!(supervision.cycle(at(cycle), cycle, Operate, &all).0, mode, "cycle {cycle}");
+                }
+            }
+        }
+    }
+}

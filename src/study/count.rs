@@ -32,6 +32,10 @@ pub struct NetworkCounts {
     pub retries: u64,
     /// Requests that stayed without answer after all retries.
     pub no_answers: u64,
+    /// Times that slaves asked for Slave_Diag during data exchange (DH).
+    pub diagnoses: u64,
+    /// Times that the master went back to Clear on its own.
+    pub auto_clears: u64,
     /// SYNCHs that could not be sent when planned.
     pub late_clocks: u64,
     /// The latest of them.
@@ -106,6 +110,8 @@ pub struct SlaveCounts {
     pub retries: u64,
     /// Requests to this slave without answer after all retries.
     pub no_answers: u64,
+    /// Times that this slave asked for Slave_Diag during data exchange (DH).
+    pub diagnoses: u64,
     /// The first SYNCH that the clock recovery took, as true instant and number of begun cycles.
     first: Option<(Time, u64)>,
     /// When the present phase was entered.
@@ -175,6 +181,13 @@ impl Counts {
             }
             Observation::SynchMissed { cycles } => self.network.missed_clocks += cycles,
             Observation::TokenReceived { t_rr, .. } if t_rr > Span::ZERO => self.network.rotation.add(t_rr),
+            Observation::AutoClear { .. } => self.network.auto_clears += 1,
+            Observation::DiagnosisDue { slave: address } => {
+                self.network.diagnoses += 1;
+                if let Some(index) = slave(address) {
+                    self.slaves[index].diagnoses += 1;
+                }
+            }
             Observation::TokenClaimed => self.network.tokens_claimed += 1,
             Observation::Retry { slave: address } => {
                 self.network.retries += 1;
@@ -229,6 +242,7 @@ impl SlaveCounts {
             phases: [Span::ZERO; Phase::ALL.len()],
             retries: 0,
             no_answers: 0,
+            diagnoses: 0,
             first: None,
             since: Time::ZERO,
         }

@@ -88,15 +88,18 @@ impl Plan {
     pub fn content(&self) -> Span {
         self.t_dx + self.gap + self.token + self.synch
     }
-    /// What T_DP must hold while `slave` starts up and all others exchange data: its Set_Prm of `octets`, which is its
-    /// longest service, one token, SYNCH. Model: D6, the service must end before SYNCH.
+    /// What T_DP must hold while `slave` starts up and all others exchange data: its longest service, which is its Set_Prm
+    /// of `octets` or its Slave_Diag of Max_Diag_Data_Len, one token, SYNCH. Model: D6, the service must end before SYNCH.
     pub fn start_up(&self, scenario: &Scenario, slave: &Slave, octets: usize) -> Span {
         let bus = &scenario.bus.params;
         let own = self.slots.iter().find(|slot| slot.slave == slave.address);
         let own = own.map_or(Span::ZERO, |slot| slot.reply_end - slot.request);
-        let set_prm = bus.rate.octets(SAP_OVERHEAD + octets);
-        let answer = (bus.span(bus.max_tsdr) + bus.rate.octets(SAP_OVERHEAD)).max(bus.span(bus.t_sl));
-        self.t_dx - own + set_prm + answer + self.token + self.synch
+        let service = |request: usize, reply: usize| {
+            let answer = bus.span(bus.max_tsdr) + bus.rate.octets(SAP_OVERHEAD + reply);
+            bus.rate.octets(SAP_OVERHEAD + request) + answer.max(bus.span(bus.t_sl))
+        };
+        let longest = service(octets, 0).max(service(0, slave.device.max_diag.into()));
+        self.t_dx - own + longest + self.token + self.synch
     }
     /// The shortest T_DP on the grid of `device` that holds the cycle and that the device allows (manual 3.3.2).
     pub fn t_dp_min(&self, device: &Profile) -> Span {
@@ -226,6 +229,19 @@ mod tests {
             plan.slots.iter().map(|s| [s.request, s.request_end, s.reply, s.reply_end].map(tbit)).collect();
         assert_eq!(slots, [[800, 943, 1_743, 1_974], [2_050, 2_193, 3_005, 3_236]]);
         assert_eq!(tbit(plan.content()), 3_236 + (76 + 66 + 1_000) + (76 + 33) + (76 + 143));
+    }
+
+    /// At 1.5 Mbit/s: a Set_Prm of 59 octets and T_SL take 770 + 300 t_bit, a Slave_Diag of 6 octets 121 + 337, one of
+    /// 244 octets 121 + 150 + 2805.
+    #[test]
+    fn the_longest_service_of_a_start_up_is_set_prm_or_a_long_diagnosis() {
+        let mut network = network(BitRate::M1_5, find("simodrive-sensor-isochron").unwrap(), 1);
+        let plan = Plan::of(&network);
+        let usual = plan.start_up(&network, &network.slaves[0], 59);
+        let device = Profile { max_diag: 244, ..Profile::clone(&network.slaves[0].device) };
+        network.slaves[0].device = device.into();
+        let long = plan.start_up(&network, &network.slaves[0], 59);
+        assert_eq!(long - usual, BitRate::M1_5.span(Tbit(121 + 150 + 2_805 - 770 - 300)));
     }
 
     #[test]

@@ -50,6 +50,8 @@ fn network(summary: &Summary, lines: &mut Vec<String>) {
         (counts.faults, "fault"),
         (counts.retries, "retry"),
         (counts.no_answers, "missing answer"),
+        (counts.diagnoses, "DH reply"),
+        (counts.auto_clears, "AutoClear"),
         (counts.late_clocks, "late clock"),
         (counts.collisions, "collision"),
         (counts.disturbed, "disturbed telegram"),

@@ -128,6 +128,12 @@ pub struct Happened {
     pub retries: u64,
     /// Requests without answer after all retries.
     pub no_answers: u64,
+    /// Times that slaves asked for Slave_Diag during data exchange; not written where it did not happen.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub diagnoses: u64,
+    /// Times that the master went back to Clear on its own; not written where it did not happen.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub auto_clears: u64,
     /// SYNCHs that could not be sent when planned.
     pub late_clocks: u64,
     /// Tokens claimed after silence, the first one included.
@@ -221,6 +227,9 @@ pub struct SlaveSummary {
     pub retries: u64,
     /// Requests without answer after all retries.
     pub no_answers: u64,
+    /// Times that it asked for Slave_Diag during data exchange; not written where it did not happen.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub diagnoses: u64,
     /// True time in each start-up phase.
     #[serde(rename = "phases_ms", serialize_with = "phases")]
     pub phases: Vec<(&'static str, Span)>,
@@ -454,6 +463,8 @@ fn happened(counts: &Counts) -> Happened {
         faults: counts.slaves.iter().map(SlaveCounts::fault_count).sum(),
         retries: network.retries,
         no_answers: network.no_answers,
+        diagnoses: network.diagnoses,
+        auto_clears: network.auto_clears,
         late_clocks: network.late_clocks,
         tokens_claimed: network.tokens_claimed,
         collisions: network.collisions,
@@ -483,11 +494,16 @@ fn slave(index: usize, facts: &Facts, counts: &Counts, histograms: &Histograms) 
         acknowledgements: counts.acknowledgements,
         retries: counts.retries,
         no_answers: counts.no_answers,
+        diagnoses: counts.diagnoses,
         phases: phases.map(|(phase, span)| (phase.text(), span)).collect(),
         distributions: distributions(histograms, Subject::Slave(counts.address)),
     }
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+const fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
 fn map<S: Serializer, K: Serialize, V: Serialize>(entries: &[(K, V)], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(entries.iter().map(|(key, value)| (key, value)))
 }

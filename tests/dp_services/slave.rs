@@ -296,6 +296,43 @@ fn sync_and_freeze_end_with_data_exchange_and_need_their_request() {
     assert_eq!((bench.outputs(), bench.diag().0), (Some(vec![2, 2]), [0x00, 0x04, 0x00]));
 }
 
+/// The end of the watchdog is the end of the outputs, of both modes and of what waited.
+#[test]
+fn after_the_watchdog_nothing_of_before_is_in_force() {
+    let mut prm = PRM;
+    prm[0] |= 0x08;
+    let mut bench = Bench::exchanging(&prm);
+    bench.exchange(&[1, 1]);
+    bench.control(SYNC | FREEZE, 0);
+    bench.exchange(&[2, 2]);
+    bench.out.clear();
+    bench.slave.watchdog(bench.now, &mut bench.device, &mut bench.out);
+    assert!(bench.device.left);
+    assert_eq!((bench.diag(), bench.slave.state()), (([0x02, 0x05, 0x00], vec![]), SlaveState::WaitPrm));
+    assert_eq!(bench.exchange(&[3, 3]).0, 0x03, "RS");
+    bench.device.told.clear();
+    assert_eq!(bench.srd((Sap::SET_PRM, Sap::MASTER_MS0), &prm), [0xE5]);
+    assert_eq!(bench.srd((Sap::CHK_CFG, Sap::MASTER_MS0), CFG), [0xE5]);
+    assert_eq!(bench.outputs(), None);
+    bench.control(SYNC, 0);
+    assert_eq!(bench.outputs(), None, "what waited is gone");
+    bench.control(UNSYNC, 0);
+    bench.exchange(&[4, 4]);
+    assert_eq!(bench.outputs(), Some(vec![4, 4]));
+}
+
+/// Without Fail_Safe zeros are outputs like any other, and an empty request has a wrong length.
+#[test]
+fn clear_for_a_slave_without_fail_safe_is_zeros() {
+    let mut prm = PRM;
+    prm[7] = 0;
+    let mut bench = Bench::exchanging(&prm);
+    bench.control(CLEAR, 0);
+    bench.exchange(&[0, 0]);
+    assert_eq!((bench.outputs(), &bench.device.operates[..]), (Some(vec![0, 0]), &[false][..]));
+    assert_eq!((bench.exchange(&[]).0, bench.slave.state()), (0x03, SlaveState::WaitPrm));
+}
+
 #[test]
 fn requests_of_a_device_that_has_neither_are_not_supported() {
     for (sync, freeze) in [(false, false), (true, false), (false, true), (true, true)] {
