@@ -23,7 +23,7 @@ fn reference(sets: &[(&str, &str)]) -> Scenario {
     shipped("reference", sets)
 }
 fn shipped(name: &str, sets: &[(&str, &str)]) -> Scenario {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name).with_extension("toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/{name}.toml"));
     let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
     Scenario::load(&path, &sets).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -50,6 +50,14 @@ fn the_counter_counts() {
 #[test]
 fn a_running_network_allocates_nothing() {
     let scenario = reference(&[]);
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&scenario), 0);
+    assert_eq!(allocations::<HeapQueue<NetworkEvent>>(&scenario), 0);
+}
+
+#[test]
+fn repeaters_with_jitter_allocate_nothing() {
+    let sets = [("run.duration", "10 s"), ("repeater.1.jitter", "50 ns"), ("repeater.2.jitter", "100 ns")];
+    let scenario = shipped("repeaters", &sets);
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&scenario), 0);
     assert_eq!(allocations::<HeapQueue<NetworkEvent>>(&scenario), 0);
 }

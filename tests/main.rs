@@ -18,3 +18,4 @@ mod ring;
 mod scenarios;
 mod startup;
 mod support;
+mod topology;

@@ -1,6 +1,6 @@
 //! Masters that are not alone: the token ring in whole networks, free-running masters, and the scenarios about them.
 
-use isodp::observation::{MasterMode, Observation, Phase, RingExit, SlaveState};
+use isodp::observation::{ClockVerdict, MasterMode, Observation, Phase, RingExit, SlaveState};
 use isodp::sim::network::NetworkEvent;
 use isodp::sim::queue::NearQueue;
 use isodp::study::scenario::Scenario;
@@ -223,7 +223,7 @@ fn run_free(master: &str, more: &str) -> Run {
 
 #[test]
 fn a_free_running_master_polls_as_fast_as_it_can() {
-    let text = free("", "").replace("[[slave]]", "[[slave]]\nmin_slave_interval = \"50 us\"");
+    let text = free("", "").replace("[[slave]]", "[[slave]]\nmin_slave_interval = \"1 us\"");
     let run = Run::of(&parse(&text).unwrap_or_else(|error| panic!("{error}")));
     assert_eq!((run.cycles.len(), collisions(&run)), (300, 0));
     // Two of 143 + 30 + 231 and T_ID1 between them; then the token.
@@ -310,9 +310,12 @@ fn keys_of_isochronous_mode_are_refused_without_it() {
 #[test]
 fn stations_of_several_masters_are_checked() {
     for (more, part) in [
-        ("[[class1]]\naddress = 2\n", "another station has the address 2"),
-        ("[[class1]]\naddress = 4\n", "another station has the address 4"),
-        ("[[class1]]\naddress = 3\n[[class1]]\naddress = 3\n", "another station has the address 3"),
+        ("[[class1]]\naddress = 2\n", "the master and a class 1 master have the address 2"),
+        ("[[class1]]\naddress = 4\n", "a slave and a class 1 master have the address 4"),
+        (
+            "[[class1]]\naddress = 3\n[[class1]]\naddress = 3\n",
+            "a class 1 master and a class 1 master have the address 3",
+        ),
         ("[[class1]]\naddress = 30\n", "above hsa"),
         ("[[slave]]\naddress = 9\nmaster = 7\ndevice = \"posital-ocd-dpb1b\"\n", "there is none at 7"),
         ("[[event]]\nat = \"1 ms\"\ndo = \"power-off\"\nstation = 8\n", "there is no station 8"),
@@ -378,4 +381,36 @@ fn a_master_that_restarts_tells_its_application_that_the_slaves_left() {
     assert_eq!([4, 5].map(|slave| joined(address(slave))), [2, 2], "each joins, and joins again");
     let numbers: Vec<_> = run.cycles.iter().map(|row| row.cycle).collect();
     assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "numbers go on");
+}
+
+/// SYNCH is on its way long before it leaves: a master without supply sends it no more.
+#[test]
+fn a_master_without_supply_sends_no_synch() {
+    let text = "[run]\nduration = \"300 ms\"\n[bus]\nrate = \"12 Mbit/s\"\n[master]\naddress = 2\nt_dp = \"2 ms\"\nt_i = \"125 us\"\n\
+                t_o = \"500 us\"\n[[slave]]\naddress = 4\ndevice = \"posital-ocd-dpb1b\"\n\
+                [[event]]\nat = \"100 ms\"\ndo = \"power-off\"\nstation = 2\n\
+                [[event]]\nat = \"100100 us\"\ndo = \"power-on\"\nstation = 2\n";
+    let run = Run::of(&parse(text).unwrap_or_else(|error| panic!("{error}")));
+    let clock = |(at, what): (Time, &Observation)| match *what {
+        Observation::Clock { verdict, .. } if at > ms(100) => Some(verdict),
+        _ => None,
+    };
+    assert_eq!(seen(&run, 4).find_map(clock), Some(ClockVerdict::Missing));
+    let starts = seen(&run, 2).filter(|(_, what)| matches!(what, Observation::CycleStart { .. })).count();
+    assert_eq!(starts, run.cycles.len());
+    let numbers: Vec<_> = run.cycles.iter().map(|row| row.cycle).collect();
+    assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "no cycle without SYNCH is counted");
+    assert_eq!(run.counts_of(4).phase, Phase::Operation, "and it is back");
+}
+
+/// Slaves that must not be asked often never make a master wait with the token in its hand.
+#[test]
+fn a_slow_slave_does_not_hold_the_token_up() {
+    let more = "[[slave]]\naddress = 9\ndevice = \"posital-ocd-dpb1b\"\nmin_slave_interval = \"5 ms\"\n\
+                [[class1]]\naddress = 3\n[[slave]]\naddress = 12\nmaster = 3\ndevice = \"posital-ocd-dpb1b\"\n";
+    let run = run_free("", more);
+    let retries = run.observations.iter().filter(|(.., what)| matches!(what, Observation::TokenRetry { .. })).count();
+    assert_eq!((retries, collisions(&run)), (0, 0));
+    let faster = run.cycles.iter().filter_map(|row| row.t_dp).filter(|&t_dp| t_dp < Span::from_ms(5)).count();
+    assert!(faster < 60, "once slave 9 takes part: {faster}");
 }

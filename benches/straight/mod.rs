@@ -28,7 +28,6 @@ use isodp::device::sensor::{Faults, Sensor, SensorOptions, Xist1, Xist2};
 use isodp::device::sign_of_life::{Counter, Monitor, MonitorSettings};
 use isodp::dp::GLOBAL_CONTROL;
 use isodp::observation::ClockVerdict;
-use isodp::sim::bus::Place;
 use isodp::sim::crystal::Crystal;
 use isodp::sim::motion::{Resolution, Shaft};
 use isodp::sim::noise::JitterSource;
@@ -189,7 +188,7 @@ impl Slave {
         let told = start.station(slave.address);
         Self {
             address: slave.address,
-            delay: Place::at(slave.position_mm).delay(Place::at(scenario.master.position_mm)),
+            delay: scenario.delay(slave.address, scenario.master.address),
             crystal: told.crystal().clone(),
             shaft: Shaft::new(&slave.motion).expect("a checked motion"),
             resolution: Resolution::new(steps, revolutions).expect("a profile's disc"),

@@ -14,12 +14,12 @@ use crate::dp::iso::Rearm;
 use crate::dp::master::{Master, Pace, Settings};
 use crate::dp::ms2::{self, client};
 use crate::observation::MasterMode;
-use crate::sim::bus::Place;
 use crate::sim::crystal::Crystal;
 use crate::sim::motion::{self, Shaft};
-use crate::sim::network::{self, Act, Network, NetworkEvent, Site};
-use crate::sim::noise::{JitterSource, Purpose, Stream};
+use crate::sim::network::{self, Act, Network, NetworkEvent, Site, Wiring};
+use crate::sim::noise::{JitterSource, LinkJitter, Purpose, Stream};
 use crate::sim::queue::Queue;
+use crate::sim::topology::Place;
 use crate::study::plan::Plan;
 use crate::study::scenario::{self, Action, Class1, CodeSequence, Scenario, Slave, When};
 use crate::time::{Local, Span, Time};
@@ -152,14 +152,14 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     let master = scenario.master;
     let mut sites = vec![Site {
         machine: Node::Master(master_of(scenario)),
-        place: Place::at(master.position_mm),
+        place: place(scenario, master.address),
         crystal: crystal(seed, master.address, master.crystal),
         shaft: None,
         powered_at: Time::ZERO + master.powered_at,
     }];
     sites.extend(scenario.class1.iter().map(|class1| Site {
         machine: Node::Master(further_master(scenario, class1)),
-        place: Place::at(class1.position_mm),
+        place: place(scenario, class1.address),
         crystal: crystal(seed, class1.address, class1.crystal),
         shaft: None,
         powered_at: Time::ZERO + class1.powered_at,
@@ -167,7 +167,8 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
-    let mut network = Network::new(scenario.bus.params.rate, sites, jitter, scenario.disturbances.clone());
+    let mut network =
+        Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, scenario.disturbances.clone());
     for event in &scenario.events {
         let when = match event.when {
             When::Time(span) => network::When::Time(Time::ZERO + span),
@@ -178,6 +179,19 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
         }
     }
     network
+}
+
+/// The cables; every repeater with jitter has its own draws, by its name.
+fn wiring(scenario: &Scenario) -> Wiring {
+    let repeaters = scenario.topology.repeaters().iter().enumerate();
+    let jitter = repeaters.filter(|(_, repeater)| repeater.jitter > Span::ZERO);
+    let jitter = jitter.map(|(i, repeater)| (i, LinkJitter::new(repeater.jitter, scenario.run.seed, &repeater.name)));
+    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect() }
+}
+
+/// Where a station is.
+fn place(scenario: &Scenario, station: Address) -> Place {
+    scenario.topology.place(scenario.point(station).expect("a station of the scenario"))
 }
 
 fn master_of(scenario: &Scenario) -> Master<Controller> {
@@ -252,7 +266,7 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let shaft = Shaft::new(&slave.motion).expect("a checked motion");
     Site {
         machine,
-        place: Place::at(slave.position_mm),
+        place: place(scenario, slave.address),
         crystal: crystal(scenario.run.seed, slave.address, slave.crystal),
         shaft: Some((shaft, resolution.expect("a checked resolution"))),
         powered_at: Time::ZERO + slave.powered_at,
@@ -285,7 +299,7 @@ fn class2_site(scenario: &Scenario, class2: &scenario::Class2) -> Site<Node> {
         class2::Settings { address: class2.address, bus, ms2, per_token: class2.per_token, slaves: slaves.clone() };
     Site {
         machine: Node::Class2(Class2::new(settings, Tool::new(slaves, jobs))),
-        place: Place::at(class2.position_mm),
+        place: place(scenario, class2.address),
         crystal: crystal(scenario.run.seed, class2.address, class2.crystal),
         shaft: None,
         powered_at: Time::ZERO + class2.powered_at,

@@ -19,3 +19,4 @@ pub mod run;
 mod sample;
 pub mod scenario;
 pub mod summary;
+pub mod topology;

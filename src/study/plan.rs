@@ -11,7 +11,7 @@
 use crate::device::profile::Profile;
 use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
-use crate::study::scenario::{Bus, Scenario, Slave};
+use crate::study::scenario::{Scenario, Slave};
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
 
@@ -66,7 +66,7 @@ impl Plan {
         let mut start = if clocked { bus.span(bus.t_id2()) } else { Span::ZERO };
         let mut slots = Vec::with_capacity(scenario.slaves.len());
         for slave in scenario.configured() {
-            let t_td = Bus::propagation(slave.position_mm.abs_diff(scenario.master.position_mm));
+            let t_td = scenario.t_td(scenario.master.address, slave.address);
             let t_sdr = longest_tsdr(bus, slave, scenario.publishes(slave.address));
             let slot = slot(bus, slave, start, t_td * 2 + bus.span(t_sdr));
             start = slot.reply_end + t_id1;

@@ -14,6 +14,7 @@ pub const LINKS: usize = 8;
 pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     let mut lines = Vec::new();
     network(summary, &mut lines);
+    topology(summary, &mut lines);
     slaves(summary, &mut lines);
     leds(summary, &mut lines);
     spread(summary, &mut lines);
@@ -75,6 +76,15 @@ fn ring(summary: &Summary, lines: &mut Vec<String>) {
     ));
 }
 
+/// What is doubtful about the cables, and how they are joined if there is more than one.
+fn topology(summary: &Summary, lines: &mut Vec<String>) {
+    lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
+    if !summary.topology.is_empty() {
+        lines.push(String::new());
+        lines.extend(summary.topology.iter().cloned());
+    }
+}
+
 fn slaves(summary: &Summary, lines: &mut Vec<String>) {
     let mut shown: Vec<_> = summary.slaves.iter().collect();
     let more = shown.len().saturating_sub(SLAVES);
@@ -132,7 +142,7 @@ fn leds(summary: &Summary, lines: &mut Vec<String>) {
 }
 
 /// Ascending numbers as `3..5, 9`.
-fn ranges(numbers: &[u8]) -> String {
+pub(super) fn ranges(numbers: &[u8]) -> String {
     let part = |run: &[u8]| match *run {
         [first, _, .., last] => format!("{first}..{last}"),
         [first, last] => format!("{first}, {last}"),

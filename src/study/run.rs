@@ -13,6 +13,7 @@ use super::plot::{BusCycle, Distribution, Distributions, LinkLatencies, PlotErro
 use super::row::Sink;
 use super::scenario::{Extent, Scenario};
 use super::summary::{Facts, SlaveFacts, Summary};
+use super::topology::Map;
 use crate::device::node::Node;
 use crate::sim::fingerprint::{Digest, Fingerprint, Fingerprints};
 use crate::sim::motion::Shaft;
@@ -23,6 +24,8 @@ use crate::wire::Address;
 
 /// Events between two looks at the progress.
 const STRIDE: u64 = 50_000;
+/// File of the topology in text.
+const TOPOLOGY: &str = "topology.txt";
 /// Bins of a histogram in a picture.
 const BINS: usize = 120;
 
@@ -149,16 +152,16 @@ pub fn run<Q: Queue<NetworkEvent>>(
     let (counts, sinks) = metrics.finish(network.now());
 
     let summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
-    conclude(summary, &counts, sinks, bus.as_ref(), &fingerprints, dir)
+    conclude(scenario, summary, &counts, sinks, (&fingerprints, bus.as_ref()), dir)
 }
 
-/// Adds the fingerprints, the LEDs and the receptions, then writes the files.
+/// Adds the fingerprints, the LEDs, what slaves and masters did and the topology, then writes the files.
 fn conclude(
+    scenario: &Scenario,
     mut summary: Summary,
     counts: &Counts,
     sinks: Sinks,
-    bus: Option<&BusCycle>,
-    fingerprints: &Fingerprints,
+    (fingerprints, bus): (&Fingerprints, Option<&BusCycle>),
     dir: Option<PathBuf>,
 ) -> Result<Outcome, RunError> {
     let mut digest = Digest::default();
@@ -175,11 +178,20 @@ fn conclude(
     summary.show_leds(counts);
     summary.show_receptions(counts);
     summary.show_acyclic(counts);
+    let map = Map::of(scenario);
+    if scenario.topology.has_segments() {
+        summary.topology = map.text(false);
+    }
+    summary.warnings = scenario.warnings();
 
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {
         pictures = stage(dir, plots.pictures(&distributions(&sinks.histograms), bus)?)?;
         summary.files.extend(Plots::files().map(str::to_owned));
+    }
+    if let Some(dir) = &dir {
+        pictures.extend(stage(dir, vec![(TOPOLOGY, map.text(true).join("\n") + "\n")])?);
+        summary.files.push(TOPOLOGY.to_owned());
     }
     if let Some(exports) = sinks.exports {
         exports.finish(pictures, &sinks.histograms, &mut summary)?;
@@ -187,7 +199,7 @@ fn conclude(
     Ok(Outcome { summary, fingerprint, stations: fingerprints.stations().collect(), statistics, dir })
 }
 
-/// Writes the pictures under temporary names.
+/// Writes pictures and texts under temporary names.
 fn stage(dir: &Path, pictures: Vec<(&str, String)>) -> Result<Vec<Staged>, ExportError> {
     let mut staged = Vec::with_capacity(pictures.len());
     for (name, text) in pictures {
@@ -224,6 +236,7 @@ fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
         slaves: layout.slaves().iter().map(|slave| slave.address).collect(),
         links: layout.links().to_vec(),
         duration: scenario.master.t_dp * cycles(scenario) as i64,
+        topology: Map::of(scenario),
     }
 }
 

@@ -18,11 +18,14 @@ mod options;
 mod read;
 mod section;
 mod services;
+mod station;
+pub mod topology;
 mod tree;
 
 pub use class2::{Class2, Class2Job};
 pub use error::{Fault, Position, Problem, ScenarioError};
 pub use link::{Link, Sample, Table};
+pub use station::Station;
 
 use crate::device::options::{Resolution, UnitOptions};
 use crate::device::profile::Device;
@@ -43,6 +46,7 @@ pub use services::{MasterServices, SlaveServices};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+pub use topology::{Point, Topology};
 use tree::Source;
 
 /// A whole scenario, complete and checked.
@@ -54,8 +58,10 @@ pub struct Scenario {
     pub question: String,
     /// How long, and with which draws.
     pub run: Run,
-    /// The line.
+    /// The bus: its rate and its times.
     pub bus: Bus,
+    /// Segments of cable and what joins them.
+    pub topology: Topology,
     /// The master whose figures are taken.
     pub master: Master,
     /// Further, free-running class 1 masters in the order of the file.
@@ -211,23 +217,18 @@ pub enum Extent {
     Cycles(u64),
 }
 
-/// The line.
+/// The bus.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Bus {
     /// Bit rate and the times of the data link layer.
     pub params: BusParams,
-    /// Length of the cable (mm), at most [`Bus::MAX_CABLE_MM`].
+    /// Length of the cable of a network without segments (mm), at most [`Bus::MAX_CABLE_MM`].
     pub cable_mm: u64,
 }
 
 impl Bus {
     /// The longest cable (mm), 100 km. Model: no network of copper and glass comes near it.
     pub const MAX_CABLE_MM: u64 = 100_000_000;
-
-    /// T_TD, how long a signal takes for `mm` of cable: 5 ns/m (PROFIBUS network manual), rounded up to a tick.
-    pub const fn propagation(mm: u64) -> Span {
-        Span::from_ticks((mm * 60).div_ceil(1_000) as i64)
-    }
 }
 
 /// The master with its application.
@@ -235,7 +236,9 @@ impl Bus {
 pub struct Master {
     /// Its address, 0..=125.
     pub address: Address,
-    /// Where on the cable it sits (mm).
+    /// Index of its segment.
+    pub segment: u8,
+    /// Where on the segment's cable it sits (mm).
     pub position_mm: u64,
     /// How far its crystal is off.
     pub crystal: Crystal,
@@ -322,7 +325,9 @@ pub struct Slave {
     pub master: Address,
     /// What it is.
     pub device: Device,
-    /// Where on the cable it sits (mm).
+    /// Index of its segment.
+    pub segment: u8,
+    /// Where on the segment's cable it sits (mm).
     pub position_mm: u64,
     /// How far its crystal is off.
     pub crystal: Crystal,
@@ -523,6 +528,7 @@ pub(crate) mod tests {
             address: address(number),
             master: address(2),
             device: device.clone(),
+            segment: 0,
             position_mm: 0,
             crystal: Crystal::Offset(0),
             t_sdr: Tbit(30),
@@ -542,8 +548,10 @@ pub(crate) mod tests {
             question: String::new(),
             run: Run { seed: 1, duration: Extent::Cycles(1_000) },
             bus: Bus { params: BusParams::profile(rate), cable_mm: 0 },
+            topology: Topology::line(0),
             master: Master {
                 address: address(2),
+                segment: 0,
                 position_mm: 0,
                 crystal: Crystal::Offset(0),
                 pace: Pace::Synch,

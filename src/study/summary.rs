@@ -16,6 +16,12 @@ use crate::wire::Address;
 pub struct Summary {
     /// The network and the run.
     pub network: Network,
+    /// Segments, links and stations as a drawing in text; empty for a network of one cable.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub topology: Vec<String>,
+    /// What a network like this should not have, but may.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// The bus cycle.
     pub timing: Timing,
     /// What happened how often.
@@ -380,6 +386,8 @@ impl Summary {
                 duration: counts.network.duration,
             },
             fingerprint: facts.fingerprint,
+            topology: Vec::new(),
+            warnings: Vec::new(),
             thinning: Vec::new(),
             events_left_out: 0,
             files: Vec::new(),

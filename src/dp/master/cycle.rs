@@ -13,6 +13,7 @@
 //! within T_SL of a token that it got, since its sender listens so long.
 
 use super::{Application, Master, Part, STATUS_OCTETS};
+use crate::dp::handler::Handler;
 use crate::fdl::{Outbox, Timer};
 use crate::observation::Observation;
 use crate::time::{Local, Span};
@@ -192,10 +193,10 @@ impl<A: Application> Master<A> {
             }
         }
     }
-    /// The least cycle time is over, and Min_Slave_Interval of the first slave.
+    /// The least cycle time is over, and Min_Slave_Interval of every slave: none makes the master wait with the token.
     fn next_start(&self) -> Local {
-        let first = self.handlers.iter().find(|handler| handler.exchanges());
-        first.and_then(crate::dp::handler::Handler::earliest).map_or(self.polling.next, |at| at.max(self.polling.next))
+        let exchanging = self.handlers.iter().filter(|handler| handler.exchanges());
+        exchanging.filter_map(Handler::earliest).fold(self.polling.next, Local::max)
     }
     /// Whether T_TH is over before Data_Exchange with `slave`: then the token goes on, and later so does the cycle.
     pub(super) fn stops_before(&mut self, slave: usize, now: Local, out: &mut Outbox) -> bool {

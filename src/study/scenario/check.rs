@@ -7,10 +7,9 @@ use super::error::Fault;
 use super::kinds::jitter_bound;
 use super::section::Reader;
 use super::services;
+use super::topology;
 use super::tree::Place;
-use super::{
-    Action, Bus, Class1, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Sample, Scenario, Slave, When,
-};
+use super::{Action, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Sample, Scenario, Slave, When};
 use crate::device::options::Resolution;
 use crate::dp::master::Pace;
 use crate::sim::motion;
@@ -33,8 +32,8 @@ pub(super) struct Facts<'a> {
 /// All rules in stages, those of isochronous mode and those of every master. A stage takes for granted that the stages
 /// before found nothing.
 const STAGES: &[(&[Rule], &[Rule])] = &[
-    (&[], &[some_slave, own_addresses, class1::stations, addresses_within_hsa, positions, crystals, run_length]),
-    (&[], &[class2::own_addresses, class2::positions, class2::slaves]),
+    (&[], &[some_slave, own_addresses, class1::owners, addresses_within_hsa, wiring, crystals, run_length]),
+    (&[], &[class2::slaves]),
     (&[isochronous_rate], &[bus_parameters, device_max_tsdr, own_t_sdr]),
     (&[t_dp_limits, t_dp_grid, t_dp_content], &[t_mapc, watchdog_outlasts_t_dp]),
     (&[services::slave_interval], &[services::data_control_time, services::sync_and_freeze]),
@@ -92,58 +91,45 @@ fn some_slave(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn own_addresses(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let master = facts.scenario.master.address;
-    if facts.scenario.slave(master).is_some() {
-        let fault = Fault::new(format!("the master and a slave have the address {master}"))
-            .rule("every station of a bus has an address of its own (EN 50170-2)");
-        about(reader, &format!("slave.{master}.address"), &[], fault);
+    // Of slaves the table is known by the address, so that two of them are found when they are read.
+    let all: Vec<_> = facts.scenario.stations().collect();
+    for (i, station) in all.iter().enumerate() {
+        if let Some(other) = all[..i].iter().find(|other| other.address == station.address) {
+            let (a, b) = (other.what_it_is(), station.what_it_is());
+            let fault = Fault::new(format!("{a} and {b} have the address {}", station.address))
+                .rule("every station of a bus has an address of its own (EN 50170-2)");
+            about(reader, &format!("{}.address", station.path()), &[], fault);
+        }
     }
-}
-
-/// The further masters with their paths.
-fn further<'a>(facts: &Facts<'a>) -> impl Iterator<Item = (&'a Class1, String)> {
-    facts.scenario.class1.iter().enumerate().map(|(i, class1)| (class1, format!("class1.{}", i + 1)))
 }
 
 fn addresses_within_hsa(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let hsa = facts.scenario.bus.params.hsa;
-    let master = facts.scenario.master.address;
-    let slaves = facts.scenario.slaves.iter().map(|s| (s.address, format!("slave.{}.address", s.address)));
-    let further = further(facts).map(|(class1, path)| (class1.address, format!("{path}.address")));
-    for (address, key) in slaves.chain([(master, "master.address".to_owned())]).chain(further) {
+    for station in facts.scenario.stations() {
+        let address = station.address;
         if address.get() > hsa {
             let fault = Fault::new(format!("the address {address} is above hsa = {hsa}"))
                 .rule("no station is above the highest station address HSA (EN 50170-2)")
                 .help(format!("hsa = {address} or more, at most 126"));
-            about(reader, &key, &[], fault);
+            about(reader, &format!("{}.address", station.path()), &[], fault);
         }
     }
 }
 
-fn positions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let cable = facts.scenario.bus.cable_mm;
-    let slaves = facts.scenario.slaves.iter().map(|s| (s.position_mm, format!("slave.{}.position", s.address)));
-    let further = further(facts).map(|(class1, path)| (class1.position_mm, format!("{path}.position")));
-    for (mm, key) in slaves.chain([(facts.scenario.master.position_mm, "master.position".to_owned())]).chain(further) {
-        if mm > cable {
-            let fault = Fault::new(format!("{} is beyond the end of the cable", metres(mm)))
-                .rule(format!("a station is 0 m to {} along the cable (Model: one line)", metres(cable)))
-                .help(format!("for example under [bus]: cable = \"{}\"", metres(mm)));
-            about(reader, &key, &[], fault);
-        }
-    }
+fn wiring(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    topology::positions(facts.scenario, reader);
+    topology::loads(facts.scenario, reader);
+    topology::jitter(facts.scenario, reader);
 }
 
 fn crystals(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let slaves = facts.scenario.slaves.iter().map(|s| (s.crystal, format!("slave.{}.crystal", s.address)));
-    let further = further(facts).map(|(class1, path)| (class1.crystal, format!("{path}.crystal")));
-    for (crystal, key) in slaves.chain([(facts.scenario.master.crystal, "master.crystal".to_owned())]).chain(further) {
-        let (Crystal::Offset(ppb) | Crystal::Within(ppb)) = crystal;
+    for station in facts.scenario.stations() {
+        let (Crystal::Offset(ppb) | Crystal::Within(ppb)) = station.crystal;
         if ppb.abs() > CRYSTAL_MAX_PPB {
             let fault = Fault::new(format!("a crystal is not off by {} ppm", ppb as f64 / 1e3))
                 .rule("a crystal is within 200 ppm (Model: twice what cheap ones have)")
                 .help(format!("\"{} ppm\" at most", ppb.signum() * CRYSTAL_MAX_PPB / 1_000));
-            about(reader, &key, &[], fault);
+            about(reader, &format!("{}.crystal", station.path()), &[], fault);
         }
     }
 }
@@ -169,14 +155,18 @@ fn isochronous_rate(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn bus_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let bus = &facts.scenario.bus;
-    if let Err(broken) = bus.params.check(Bus::propagation(bus.cable_mm)) {
+    let topology = &facts.scenario.topology;
+    let t_td = topology.t_td_max();
+    if let Err(broken) = bus.params.check(t_td) {
         let help = if broken.min <= broken.max {
             format!("{} to {} with the other bus parameters and the cable", broken.min, broken.max)
         } else {
             "no value fits with the other bus parameters and the cable: change those".to_owned()
         };
+        // A line's delay is its cable's; that of segments is not to be seen in the file.
+        let path = if topology.has_segments() { format!(", T_TD = {t_td} on the longest path") } else { String::new() };
         let fault = Fault::new(format!("{} is not allowed here", broken.value))
-            .rule(format!("{} (EN 50170-2)", broken.rule))
+            .rule(format!("{} (EN 50170-2){path}", broken.rule))
             .help(help);
         about(reader, &format!("bus.{}", broken.name), &["bus.cable", "bus.rate"], fault);
     }
@@ -822,12 +812,4 @@ fn written(span: Span) -> String {
 /// Whether octet 15 bit 1 is set, in words.
 const fn on_off(slave: &Slave) -> &'static str {
     if slave.functions { "on" } else { "off" }
-}
-
-/// A length as people write it.
-fn metres(mm: u64) -> String {
-    match mm % 1_000 {
-        0 => format!("{} m", mm / 1_000),
-        _ => format!("{mm} mm"),
-    }
 }

@@ -3,9 +3,10 @@
 
 use super::check::{Facts, about};
 use super::error::Fault;
-use super::read::{cable, crystal, watchdog};
+use super::read::{crystal, watchdog};
 use super::section::{Reader, Section, instant, number, yes};
-use super::{Action, Crystal, IsoTimes, Scenario, Slave, Watchdog};
+use super::topology::{cable, station_segment};
+use super::{Action, Crystal, IsoTimes, Scenario, Slave, Topology, Watchdog};
 use crate::dp::master::Pace;
 use crate::time::Span;
 use crate::wire::Address;
@@ -15,7 +16,9 @@ use crate::wire::Address;
 pub struct Class1 {
     /// Its address, 0..=125.
     pub address: Address,
-    /// Where on the cable it sits (mm).
+    /// Index of its segment.
+    pub segment: u8,
+    /// Where on the segment's cable it sits (mm).
     pub position_mm: u64,
     /// How far its crystal is off.
     pub crystal: Crystal,
@@ -52,17 +55,6 @@ impl Scenario {
     pub fn is_clocked(&self, slave: &Slave) -> bool {
         self.master.pace == Pace::Synch && slave.master == self.master.address
     }
-    /// Whether a station has this address.
-    fn has_station(&self, address: Address) -> bool {
-        let further = self.class1.iter().map(|class1| class1.address);
-        let mut masters = further.chain(self.class2.iter().map(|class2| class2.address));
-        address == self.master.address || self.slave(address).is_some() || masters.any(|other| other == address)
-    }
-    fn masters(&self) -> impl Iterator<Item = (String, Address)> {
-        let further = self.class1.iter().enumerate();
-        std::iter::once(("master".to_owned(), self.master.address))
-            .chain(further.map(|(i, class1)| (format!("class1.{}", i + 1), class1.address)))
-    }
 }
 
 /// Times of a slave whose master sends no SYNCH.
@@ -70,9 +62,10 @@ pub(super) const UNCLOCKED: IsoTimes =
     IsoTimes { t_i: Span::ZERO, t_o: Span::ZERO, t_pll_w: Span::from_us(1), t_pll_d: Span::ZERO };
 
 /// Reads one `[[class1]]`.
-pub(super) fn read(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Class1> {
+pub(super) fn read(mut section: Section<'_>, reader: &mut Reader<'_>, topology: Option<&Topology>) -> Option<Class1> {
     let s = &mut section;
     let address = s.required(reader, "address", "3", super::kinds::address);
+    let segment = station_segment(s, reader, topology);
     let position_mm = s.optional(reader, "position", cable).unwrap_or(0);
     let crystal = crystal(reader, s);
     let least_cycle = least_cycle(s, reader);
@@ -85,6 +78,7 @@ pub(super) fn read(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<
     section.finish(reader);
     Some(Class1 {
         address: address?,
+        segment,
         position_mm,
         crystal,
         least_cycle,
@@ -131,22 +125,14 @@ fn refuse(section: &Section<'_>, reader: &mut Reader<'_>, keys: &[&str]) {
     }
 }
 
-/// No two stations have one address, and every slave's master is there.
-pub(super) fn stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+/// Every slave's master is there.
+pub(super) fn owners(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let scenario = facts.scenario;
-    let masters: Vec<_> = scenario.masters().collect();
-    for (i, (path, address)) in masters.iter().enumerate().skip(1) {
-        let taken = masters[..i].iter().any(|(_, other)| other == address);
-        let class2 = scenario.class2.iter().any(|class2| class2.address == *address);
-        if taken || class2 || scenario.slave(*address).is_some() {
-            let fault = Fault::new(format!("another station has the address {address}"))
-                .rule("every station of a bus has an address of its own (EN 50170-2)");
-            about(reader, &format!("{path}.address"), &[], fault);
-        }
-    }
+    let further = scenario.class1.iter().map(|class1| class1.address);
+    let masters: Vec<_> = std::iter::once(scenario.master.address).chain(further).collect();
     for slave in &scenario.slaves {
-        if !masters.iter().any(|&(_, address)| address == slave.master) {
-            let all: Vec<_> = masters.iter().map(|(_, address)| address.to_string()).collect();
+        if !masters.contains(&slave.master) {
+            let all: Vec<_> = masters.iter().map(ToString::to_string).collect();
             let fault = Fault::new(format!("slave {} has no master: there is none at {}", slave.address, slave.master))
                 .rule("master is the address of [master] or of a [[class1]]")
                 .help(format!("the masters are {}", all.join(", ")));
@@ -159,7 +145,10 @@ pub(super) fn stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 pub(super) fn event_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (i, event) in facts.scenario.events.iter().enumerate() {
         let power = matches!(event.action, Action::PowerOff | Action::PowerOn);
-        let missing = event.slaves.iter().find(|&&address| power && !facts.scenario.has_station(address));
+        let missing = event
+            .slaves
+            .iter()
+            .find(|&&address| power && facts.scenario.stations().all(|station| station.address != address));
         if let Some(address) = missing {
             let fault = Fault::new(format!("there is no station {address}"))
                 .help("station is the address of a master or of a slave");

@@ -6,8 +6,9 @@ use super::error::Fault;
 use super::kinds::address;
 use super::read;
 use super::section::{Reader, Section, choice, instant, number};
+use super::topology::{cable, station_segment};
 use super::tree::{Node, Table, Value};
-use super::{Crystal, Slave};
+use super::{Crystal, Slave, Topology};
 use crate::device::parameters::PARAMETERS;
 use crate::device::tool::Work;
 use crate::observation::AcyclicService;
@@ -21,7 +22,9 @@ use crate::wire::parameter::ParameterAddress;
 pub struct Class2 {
     /// Its address, 0..=125.
     pub address: Address,
-    /// Where on the cable it sits (mm).
+    /// Index of its segment.
+    pub segment: u8,
+    /// Where on the segment's cable it sits (mm).
     pub position_mm: u64,
     /// How far its crystal is off.
     pub crystal: Crystal,
@@ -74,10 +77,16 @@ const MAX_RECORD: u8 = 240;
 const SLOT: u8 = 1;
 
 /// Reads one `[[class2]]`; `all` are the addresses of all slaves.
-pub(super) fn read(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> Option<Class2> {
+pub(super) fn read(
+    mut section: Section<'_>,
+    reader: &mut Reader<'_>,
+    all: &[Address],
+    topology: Option<&Topology>,
+) -> Option<Class2> {
     let s = &mut section;
     let address = s.required(reader, "address", "1", address);
-    let position_mm = s.optional(reader, "position", read::cable).unwrap_or(0);
+    let segment = station_segment(s, reader, topology);
+    let position_mm = s.optional(reader, "position", cable).unwrap_or(0);
     let crystal = read::crystal(reader, s);
     let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
     let send_timeout = s.optional(reader, "send_timeout", acyclic::timeout);
@@ -88,6 +97,7 @@ pub(super) fn read(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Add
     section.finish(reader);
     Some(Class2 {
         address: address?,
+        segment,
         position_mm,
         crystal,
         powered_at,
@@ -170,42 +180,6 @@ fn octets(node: &Node) -> Result<Vec<u8>, Fault> {
     match &node.value {
         Value::List(items) if items.len() <= MAX_RECORD.into() => items.iter().map(number(0..=u8::MAX)).collect(),
         _ => Err(Fault::new(format!("this is no list of up to {MAX_RECORD} octets")).help("data = [0x01, 0x02]")),
-    }
-}
-
-/// No other station has the address of a class 2 master.
-pub(super) fn own_addresses(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let scenario = facts.scenario;
-    let mut taken: Vec<_> = scenario.slaves.iter().map(|slave| slave.address).collect();
-    taken.push(scenario.master.address);
-    for (i, class2) in scenario.class2.iter().enumerate() {
-        let key = format!("class2.{}.address", i + 1);
-        let (address, hsa) = (class2.address, scenario.bus.params.hsa);
-        if taken.contains(&address) {
-            let fault = Fault::new(format!("another station has the address {address}"))
-                .rule("every station of a bus has an address of its own (EN 50170-2)");
-            about(reader, &key, &[], fault);
-        }
-        if address.get() > hsa {
-            let fault = Fault::new(format!("the address {address} is above hsa = {hsa}"))
-                .rule("no station is above the highest station address HSA (EN 50170-2)")
-                .help(format!("hsa = {address} or more, at most 126"));
-            about(reader, &key, &[], fault);
-        }
-        taken.push(address);
-    }
-}
-
-/// A class 2 master sits on the cable.
-pub(super) fn positions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    let cable = facts.scenario.bus.cable_mm;
-    for (i, class2) in facts.scenario.class2.iter().enumerate() {
-        if class2.position_mm > cable {
-            let fault = Fault::new("this is beyond the end of the cable")
-                .rule("a station is somewhere along the cable (Model: one line)")
-                .help("a longer cable under [bus]");
-            about(reader, &format!("class2.{}.position", i + 1), &[], fault);
-        }
     }
 }
 

@@ -1116,7 +1116,99 @@ fn disturbed() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
+/// Two segments, each kind of link in turn between them, and a slave on each.
+const SEGMENTS: &str = r#"
+[run]
+cycles = 9
+[bus]
+rate = "12 Mbit/s"
+[[segment]]
+name = "a"
+cable = "100 m"
+[[segment]]
+name = "b"
+cable = "50 m"
+delay_per_metre = "6 ns"
+[[repeater]]
+kind = "olm"
+from = "a"
+to = "b"
+fibre = "10 m"
+modules = 3
+delay = "5 tbit"
+jitter = "20 ns"
+[master]
+address = 2
+segment = "a"
+t_dp = "4 ms"
+t_i = "125 us"
+t_o = "2 ms"
+[[slave]]
+address = 3
+segment = "a"
+device = "posital-ocd-dpb1b"
+[[slave]]
+addresses = "4..5"
+segment = "b"
+device = "posital-ocd-dpb1b"
+"#;
+
+#[test]
+fn segments_and_repeaters_are_read_and_overridden() {
+    let scenario = parse(SEGMENTS, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let [a, b] = scenario.topology.segments() else { panic!("two segments") };
+    assert_eq!((a.name.as_str(), a.cable_mm, a.delay_per_metre), ("a", 100_000, Span::from_ns(5)));
+    assert_eq!((b.name.as_str(), b.cable_mm, b.delay_per_metre), ("b", 50_000, Span::from_ns(6)));
+    let [link] = scenario.topology.repeaters() else { panic!("one link") };
+    assert_eq!((link.name.as_str(), link.kind.name, link.modules, link.fibre_mm), ("a - b", "olm", 3, 10_000));
+    assert_eq!(link.ends, [Point { segment: 0, mm: 100_000 }, Point { segment: 1, mm: 0 }]);
+    // Three modules of 5 t_bit and 10 m of glass.
+    assert_eq!(link.crossing(), Span::from_ns(1_250 + 50));
+    assert_eq!(link.jitter, Span::from_ns(20));
+    let at = |slave: &Slave| (slave.address.get(), slave.segment, slave.position_mm);
+    assert_eq!(scenario.slaves.iter().map(at).collect::<Vec<_>>(), [(3, 0, 100_000), (4, 1, 25_000), (5, 1, 50_000)]);
+
+    let sets = [
+        ("segment.2.cable", "60 m"),
+        ("repeater.1.delay", "1 us"),
+        ("slave.5.segment", "a"),
+        ("repeater.1.to_position", "7 m"),
+    ];
+    let other = parse(SEGMENTS, &sets).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(other.slaves.iter().map(at).collect::<Vec<_>>(), [(3, 0, 50_000), (4, 1, 60_000), (5, 0, 100_000)]);
+    assert_eq!(other.topology.repeaters()[0].crossing(), Span::from_ns(3_050));
+    assert_eq!(other.delay(address(2), address(4)), Span::from_ns(500 + 3_050 + 53 * 6));
+}
+
+#[test]
+fn t_td_is_the_delay_with_the_worst_jitter_and_rounded_up() {
+    let scenario = parse(SEGMENTS, &[("slave.5.position", "33333 mm"), ("repeater.1.to_position", "1 mm")]);
+    let scenario = scenario.unwrap_or_else(|error| panic!("{error}"));
+    let (master, slave) = (address(2), address(5));
+    assert_eq!(scenario.t_td(master, slave), scenario.t_td(slave, master));
+    let more = scenario.t_td(master, slave) - scenario.delay(master, slave) - Span::from_ns(20);
+    assert!((Span::ZERO..=Span::from_ticks(2)).contains(&more), "{more}");
+    assert!(scenario.topology.t_td_max() >= scenario.t_td(master, slave));
+    assert_eq!(scenario.t_td(master, address(77)), Span::ZERO, "there is no such station");
+}
+
 proptest! {
+    #[test]
+    fn numbers_of_any_size_in_segments_do_not_panic(
+        place in prop::sample::select(vec![
+            "segment.1.cable", "segment.2.delay_per_metre", "segment.2.name", "repeater.1.from", "repeater.1.to",
+            "repeater.1.from_position", "repeater.1.to_position", "repeater.1.delay", "repeater.1.jitter",
+            "repeater.1.modules", "repeater.1.fibre", "repeater.1.kind", "master.segment", "slave.4.segment",
+            "slave.4.position", "bus.cable",
+        ]),
+        number in prop_oneof![any::<i64>(), -1000i64..100_000],
+        unit in prop::sample::select(vec!["", " tick", " us", " s", " tbit", " m", " km", " mm"]),
+    ) {
+        match parse(SEGMENTS, &[(place, &format!("{number}{unit}"))]) {
+            Err(error) => prop_assert!(!error.problems.is_empty()),
+            Ok(scenario) => prop_assert!(scenario.topology.t_td_max() >= Span::ZERO),
+        }
+    }
     #[test]
     fn no_octets_panic(octets in prop_oneof![prop::collection::vec(any::<u8>(), 0..400), disturbed()]) {
         if let Ok(text) = decode(&octets)
@@ -1127,7 +1219,7 @@ proptest! {
     }
     #[test]
     fn no_override_panics(
-        key in "(master|slave|run|bus|link|event|x)(\\.(3|1|0|t_o|rate|cable|motion|)){0,3}",
+        key in "(master|slave|run|bus|link|event|segment|repeater|x)(\\.(3|1|0|t_o|rate|cable|motion|)){0,3}",
         value in ".{0,30}",
     ) {
         if let Err(error) = parse(GOOD, &[(&key, &value)]) {

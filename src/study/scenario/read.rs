@@ -9,10 +9,11 @@ use super::link::link;
 use super::options;
 use super::section::{Reader, Section, choice, cycle_time, instant, number, quantity, suggestion, text, yes};
 use super::services;
+use super::topology::{self, cable, spread, station_segment};
 use super::tree::{Node, Place, Table, Value};
 use super::{
     Action, Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Master, Record, Run, Scaling,
-    Scenario, Slave, Watchdog, When,
+    Scenario, Slave, Topology, Watchdog, When,
 };
 use crate::device::profile::{Device, PROFILES, Profile};
 use crate::dp::master::Pace;
@@ -20,13 +21,25 @@ use crate::fdl::params::BusParams;
 use crate::sim::motion::{Angle, Motion};
 use crate::sim::noise::GcJitter;
 use crate::study::plan::Plan;
-use crate::study::quantity::{bit_rate, millimetres, ppb, tbit};
+use crate::study::quantity::{bit_rate, ppb, tbit};
 use crate::time::{BitRate, Span, Tbit};
 use crate::wire::Address;
 
 /// The tables of a file; the second half is lists, `[[slave]]`.
-const TABLES: [&str; 10] =
-    ["run", "bus", "master", "record", "slave", "class1", "class2", "link", "event", "disturbance"];
+const TABLES: [&str; 12] = [
+    "run",
+    "bus",
+    "master",
+    "record",
+    "segment",
+    "repeater",
+    "slave",
+    "class1",
+    "class2",
+    "link",
+    "event",
+    "disturbance",
+];
 /// How many of [`TABLES`] are single tables.
 const SINGLE: usize = 4;
 
@@ -47,20 +60,27 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
     let run = run(Section::of_file(reader, &root, "run"), reader);
     let bus = bus(Section::of_file(reader, &root, "bus"), reader);
     let rate = bus.map_or(BitRate::M12, |bus| bus.params.rate);
+    let topology = topology::read(reader, &root, rate, bus.map_or(0, |bus| bus.cable_mm));
     let section = Section::of_file(reader, &root, "master");
-    let (master, times) = master(section, reader, rate).unzip();
-    let cable_mm = bus.map_or(0, |bus| bus.cable_mm);
-    let count = slave_tables.len();
-    let mut slaves = Vec::with_capacity(count);
+    let (master, times) = master(section, reader, rate, topology.as_ref()).unzip();
+    let tables = slave_tables.iter().map(|slave| &slave.table);
+    let positions = topology.as_ref().map(|topology| spread(topology, tables)).unwrap_or_default();
+    let mut slaves = Vec::with_capacity(slave_tables.len());
     for (index, table) in slave_tables.iter().enumerate() {
-        // Spread evenly, the last one at the end.
-        let position_mm = cable_mm * (index as u64 + 1) / count as u64;
-        let context = Context { bus: bus.as_ref(), master: master.as_ref(), times: times.as_ref(), position_mm };
+        let position_mm = positions.get(index).copied().unwrap_or(0);
+        let context = Context {
+            bus: bus.as_ref(),
+            master: master.as_ref(),
+            topology: topology.as_ref(),
+            times: times.as_ref(),
+            position_mm,
+        };
         slaves.extend(slave(reader, table, &context));
     }
     let addresses: Vec<_> = slave_tables.iter().map(|table| table.address).collect();
-    let class1 = list(reader, &root, "class1", class1::read);
-    let class2 = list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses));
+    let class1 = list(reader, &root, "class1", |section, reader| class1::read(section, reader, topology.as_ref()));
+    let class2 =
+        list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses, topology.as_ref()));
     let links = list(reader, &root, "link", link);
     let events = list(reader, &root, "event", |section, reader| event(section, reader, &addresses));
     let disturbances = list(reader, &root, "disturbance", disturbance);
@@ -70,6 +90,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         question: String::new(),
         run: run?,
         bus: bus?,
+        topology: topology?,
         master: master?,
         class1,
         slaves,
@@ -116,7 +137,7 @@ fn tables<'t>(reader: &mut Reader<'_>, root: &'t Table, name: &str) -> Vec<(Plac
 }
 
 /// Reads the list `name` with `read`, entry by entry.
-fn list<T>(
+pub(super) fn list<T>(
     reader: &mut Reader<'_>,
     root: &Table,
     name: &str,
@@ -310,16 +331,13 @@ fn bus(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Bus> {
     rate.map(|_| Bus { params, cable_mm })
 }
 
-/// A length of cable (mm).
-pub(super) fn cable(node: &Node) -> Result<u64, Fault> {
-    match quantity("100 m", millimetres)(node)? {
-        mm if mm > Bus::MAX_CABLE_MM => Err(Fault::new("no cable is longer than 100 km")),
-        mm => Ok(mm),
-    }
-}
-
 /// Reads `[master]`: the master and the times that all slaves inherit.
-fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> Option<(Master, Times)> {
+fn master(
+    mut section: Section<'_>,
+    reader: &mut Reader<'_>,
+    rate: BitRate,
+    topology: Option<&Topology>,
+) -> Option<(Master, Times)> {
     let s = &mut section;
     let address = s.required(reader, "address", "2", address);
     let pace = class1::pace(s, reader);
@@ -337,6 +355,7 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
     let lost_after = s.optional(reader, "lost_after", number(1..=u32::from(u16::MAX))).unwrap_or(10);
     let clear_for = s.optional(reader, "clear_for", number(0..=i64::MAX as u64)).unwrap_or(0);
     let crystal = crystal(reader, s);
+    let segment = station_segment(s, reader, topology);
     let position_mm = s.optional(reader, "position", cable).unwrap_or(0);
     let jitter = s.table(reader, "gc_jitter");
     let (gc_jitter, accumulate) =
@@ -350,6 +369,7 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
     let (address, t_dp) = (address?, t_dp?);
     let master = Master {
         address,
+        segment,
         position_mm,
         crystal,
         pace,
@@ -439,6 +459,7 @@ pub(super) fn crystal(reader: &mut Reader<'_>, section: &mut Section<'_>) -> Cry
 struct Context<'a> {
     bus: Option<&'a Bus>,
     master: Option<&'a Master>,
+    topology: Option<&'a Topology>,
     times: Option<&'a Times>,
     position_mm: u64,
 }
@@ -451,6 +472,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let device = s.required(reader, "device", &format!("\"{}\"", PROFILES[0].name), |node| {
         choice(node, "device", PROFILES, |profile| &profile.name)
     });
+    let segment = station_segment(s, reader, context.topology);
     let position_mm = s.optional(reader, "position", cable).unwrap_or(context.position_mm);
     let crystal = crystal(reader, s);
     let t_sdr = s.optional(reader, "t_sdr", quantity("30 tbit", tbit));
@@ -487,6 +509,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
         address: from.address,
         master: master?,
         device,
+        segment,
         position_mm,
         crystal,
         t_sdr,

@@ -41,6 +41,10 @@ impl<'a> Reader<'a> {
     pub(super) fn place(&self, keys: &[&str]) -> Place {
         keys.iter().find_map(|&key| self.places.get(key).copied()).unwrap_or(Place::Missing)
     }
+    /// Whether anything is wrong so far.
+    pub(super) fn has_problems(&self) -> bool {
+        !self.problems.is_empty()
+    }
     /// All problems in the order of the file, and forgets them.
     pub(super) fn take_problems(&mut self) -> Vec<Problem> {
         self.problems.sort_by_key(|&(place, ..)| place);
