@@ -414,3 +414,33 @@ fn a_slow_slave_does_not_hold_the_token_up() {
     let faster = run.cycles.iter().filter_map(|row| row.t_dp).filter(|&t_dp| t_dp < Span::from_ms(5)).count();
     assert!(faster < 60, "once slave 9 takes part: {faster}");
 }
+
+/// With active spare the token goes round as long as T_TR fits before SYNCH, and never makes it late.
+#[test]
+fn active_spare_lets_the_token_go_round_while_t_tr_fits() {
+    let rotations = |active: &str| {
+        let run = Run::of(&scenario("gap-entry", &[("master.active_spare", active), ("bus.t_tr", "3000 tbit")]));
+        assert_eq!((collisions(&run), late(&run)), (0, vec![]), "active spare {active}");
+        let settled = ms(400)..ms(480);
+        let came: Vec<_> = seen(&run, 2)
+            .filter(|(at, what)| settled.contains(at) && matches!(what, Observation::TokenReceived { .. }))
+            .map(|(at, _)| at)
+            .collect();
+        let starts: Vec<_> = run.cycles.iter().map(|row| row.t0).filter(|t0| settled.contains(t0)).collect();
+        for pair in starts.windows(2).filter(|_| active == "true") {
+            let last = came.iter().filter(|&&at| pair[0] < at && at < pair[1]).max().expect("a token in every cycle");
+            assert!(pair[1] - *last < bits(3_000 + 143 + 2 * T_ID1), "else it would go round once more");
+        }
+        (came.len(), starts.len())
+    };
+    let ((passive, cycles), (active, _)) = (rotations("false"), rotations("true"));
+    assert!(passive.abs_diff(cycles) <= 1, "once in every cycle: {passive} in {cycles}");
+    assert!(active > 3 * cycles, "and more: {active} in {cycles}");
+}
+
+#[test]
+fn a_master_may_be_switched_on_later() {
+    let run = run_free("powered_at = \"5 ms\"", "");
+    let first = run.telegrams.iter().map(|(start, ..)| *start).min().expect("telegrams");
+    assert_eq!(first - ms(5), bits(10 * 1_000), "T_TO of address 2 after its supply came on");
+}

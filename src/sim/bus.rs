@@ -223,6 +223,25 @@ mod tests {
     }
 
     #[test]
+    fn what_a_station_without_supply_had_planned_never_comes() {
+        let mut bus = line();
+        let (running, _) = bus.send(0, (ns(0), ns(100)), &token());
+        bus.add_listeners(running, 1);
+        bus.silence(0, ns(50));
+        assert_eq!(bus.flight(running).frame.octets(), token().octets(), "under way, it is finished");
+        bus.heard(running);
+        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token());
+        bus.add_listeners(planned, 1);
+        bus.silence(1, ns(300));
+        assert!(!bus.flight(planned).frame.is_empty(), "another station's supply");
+        bus.silence(0, ns(300));
+        assert!(bus.flight(planned).frame.is_empty());
+        assert!(!bus.is_busy(ns(550), 0), "the line stays free");
+        let (_, hit) = bus.send(1, (ns(550), ns(650)), &token());
+        assert_eq!(hit, None);
+    }
+
+    #[test]
     fn a_receiver_sees_the_line_busy_one_delay_later() {
         let mut bus = line();
         let (id, _) = bus.send(0, (ns(100), ns(200)), &token());
