@@ -1,7 +1,7 @@
 //! The command line `isodp`.
 
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isodp::sim::network::NetworkEvent;
 use isodp::sim::queue::NearQueue;
+use isodp::study::gsd::Gsd;
 use isodp::study::run::{Outcome, Progress, run};
 use isodp::study::scenario::{Extent, Scenario};
 use isodp::study::{devices, report};
@@ -25,6 +26,8 @@ Examples:
       The same with other draws, files under /tmp/results/reference/.
   isodp devices posital-ocd-dpb1b
       What the profile of this device says; without a name, all devices.
+  isodp gsd scenarios/gsd/isodp_posital_06df.gsd
+      What a GSD file says; scenarios use it with device = { gsd = FILE }.
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
 
@@ -43,8 +46,10 @@ enum Command {
     /// Runs a scenario and leaves figures, tables, histograms and plots.
     #[command(after_help = EXAMPLES)]
     Run(RunArgs),
-    /// Lists the devices that a scenario can name, or tells everything about one.
+    /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
+    /// Shows what a GSD file says, what of it is ignored and what does not fit.
+    Gsd(GsdArgs),
 }
 
 #[derive(Args)]
@@ -52,6 +57,13 @@ struct DevicesArgs {
     /// The device to tell about.
     #[arg(value_name = "NAME")]
     name: Option<String>,
+}
+
+#[derive(Args)]
+struct GsdArgs {
+    /// GSD file of a PROFIBUS DP slave, in any language (.gsd, .gse, .gsg ...).
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
 }
 
 #[derive(Args)]
@@ -85,6 +97,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(args) => run_command(args),
         Command::Devices(args) => devices_command(args.name.as_deref()),
+        Command::Gsd(args) => gsd_command(&args.file),
     };
     match result.and_then(|page| show(&page)) {
         Ok(()) => ExitCode::SUCCESS,
@@ -119,6 +132,10 @@ fn run_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
 
 fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
     Ok(name.map_or_else(|| Ok(devices::list()), devices::full)?)
+}
+
+fn gsd_command(file: &Path) -> Result<String, Box<dyn std::error::Error>> {
+    Ok(Gsd::load(file)?.to_string())
 }
 
 /// The progress bar; nothing where standard error is no terminal.

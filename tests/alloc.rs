@@ -23,7 +23,7 @@ fn reference(sets: &[(&str, &str)]) -> Scenario {
     shipped("reference", sets)
 }
 fn shipped(name: &str, sets: &[(&str, &str)]) -> Scenario {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/{name}.toml"));
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{name}.toml"));
     let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
     Scenario::load(&path, &sets).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -79,4 +79,11 @@ fn a_token_that_goes_round_allocates_nothing() {
     for set in [("bus.gap_factor", "20"), ("bus.gap_factor", "1"), ("bus.t_tr", "300000 tbit")] {
         assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("two-masters", &[set])), 0, "{set:?}");
     }
+}
+
+#[test]
+fn links_in_both_tables_and_a_lost_publisher_allocate_nothing() {
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-network", &[])), 0);
+    let sets = [("run.duration", "5 s"), ("event.1.at", "2.2 s"), ("event.2.at", "4.5 s")];
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-lost-publisher", &sets)), 0);
 }

@@ -9,6 +9,7 @@ mod encoder;
 mod encoder_scenarios;
 mod foreign;
 mod golden;
+mod gsd;
 mod layers;
 mod manual;
 mod options;

@@ -383,6 +383,18 @@ fn slave_to_slave_goes_across_segments() {
     assert_eq!(network.delay(address(3), address(9)), ns(640.0 + 30.0 * 5.0));
 }
 
+/// A class 2 master is a load of its segment and has its delays.
+#[test]
+fn a_class_2_master_sits_on_a_segment_too() {
+    let text = two("delay = \"640 ns\"").replace("t_dp = \"2 ms\"", "t_dp = \"4 ms\"");
+    let other = |more: &str| format!("{text}[[class2]]\naddress = 1\n{more}\n");
+    let network = parse(&other("segment = \"b\"\nposition = \"20 m\""));
+    assert_eq!((network.loads(0), network.loads(1)), (3, 4));
+    assert_eq!(network.delay(network.master.address, address(1)), ns(500.0 + 640.0 + 100.0));
+    assert!(refused(&other("")).contains("class2.1.segment: this key is missing"));
+    assert!(refused(&other("segment = \"b\"\nposition = \"101 m\"")).contains("class2.1.position: 101 m is beyond"));
+}
+
 prop_compose! {
     /// Any tree of segments with jitter on some of its links, and a slave on each.
     fn tree()(

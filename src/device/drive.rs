@@ -10,8 +10,10 @@
 //! | LengthError | Active | LengthError | Lost, overdue |
 //!
 //! Only valid data are taken, and only those of active links are used; a link that is not active leaves what it brought
-//! last. A link that is overdue or has another length is told in the diagnosis until it is active again. Before the
-//! first data of a publisher a link is lost and not yet overdue: publishers start up one after the other (Model: D27).
+//! last. Model: D27 says "nothing valid"; a publisher that goes on sending another length stays a length error, which
+//! says more than lost. A link that is overdue or has another length is told in the diagnosis until it is active again.
+//! Before the first data of a publisher a link is lost and not yet overdue: publishers start up one after the other
+//! (Model: D27).
 
 use alloc::vec;
 use alloc::vec::Vec;

@@ -141,6 +141,7 @@ fn entries(prm: &SetPrm<'_>, limits: DxbLimits) -> Result<Vec<Entry>, Refusal> {
         let block = block?;
         match block.kind {
             BlockType::IsoM => continue,
+            BlockType::User if limits.user_blocks => continue,
             BlockType::DxbLinks | BlockType::DxbSubscriptions => {}
             kind => {
                 let rule = "this device takes isochronous, link table and subscriber table blocks only";
@@ -234,7 +235,7 @@ mod tests {
     use crate::wire::prm::{DpV1Status, DxbSubscription, PrmBuilder, PrmRule, StationStatus};
 
     const OWN: Address = Address::new(9).unwrap();
-    const LIMITS: DxbLimits = DxbLimits { links: 4, data: 20, slots: 2 };
+    const LIMITS: DxbLimits = DxbLimits { links: 4, data: 20, slots: 2, user_blocks: false };
 
     const fn link(publisher: u8, length: u8, offset: u8, sample: u8) -> DxbLink {
         DxbLink { publisher, length, offset, sample }
@@ -350,6 +351,8 @@ mod tests {
         let mut user = octets(&links[..1], &[], true);
         user.extend([4, 0x81, 0, 0]);
         assert_eq!(refused(&user), (21, 0x81));
+        let taken = Links::of(&SetPrm::parse(&user).unwrap(), OWN, DxbLimits { user_blocks: true, ..LIMITS });
+        assert!(taken.is_ok_and(|links| links.iter().len() == 1), "a device that takes user blocks");
     }
 
     #[test]

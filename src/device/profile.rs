@@ -91,15 +91,17 @@ pub struct DxbLimits {
     pub data: u8,
     /// Slots with a data area for the subscriber table, numbered from 1.
     pub slots: u8,
+    /// Whether it takes blocks of user parameters besides. Model: what they do is the manufacturer's, and nothing here.
+    pub user_blocks: bool,
 }
 
 impl DxbLimits {
     /// Most links of a subscriber (VPC3+C manual).
     pub const MOST_LINKS: u8 = 29;
     /// No subscriber.
-    pub const NONE: Self = Self { links: 0, data: 0, slots: 0 };
+    pub const NONE: Self = Self { links: 0, data: 0, slots: 0, user_blocks: false };
     /// All that the ASIC allows. Model: two slots, so that samples can go to one or the other.
-    pub const FULL: Self = Self { links: Self::MOST_LINKS, data: 244, slots: 2 };
+    pub const FULL: Self = Self { links: Self::MOST_LINKS, data: 244, slots: 2, user_blocks: false };
 }
 
 impl Profile {

@@ -19,7 +19,7 @@
 //! | DATA_EXCH | Data_Exchange by MSRD without Publisher_Enable | DATA_EXCH | RS |
 //! | DATA_EXCH | MS1 with DPV1_Enable | DATA_EXCH | see [`ms1`](crate::dp::ms1) |
 //! | any but POWER_ON | Slave_Diag, Get_Cfg | unchanged | data |
-//! | any but POWER_ON | MS2 of any master | unchanged | see [`ms2`](crate::dp::ms2) |
+//! | any but POWER_ON | MS2 of any master | unchanged | see [`ms2`] |
 //! | any | Set_Prm with neither Lock nor Unlock | unchanged, min T_SDR in force | SC |
 //! | WAIT_CFG, DATA_EXCH | Set_Prm, Chk_Cfg, Data_Exchange of another master | unchanged | RS |
 //!
@@ -225,7 +225,9 @@ impl Slave {
     }
     /// Which telegrams it wants.
     pub fn filter(&self, app: &impl Application) -> Filter {
-        Filter { all: false, own: self.identity.address, publishers: app.publishers() }
+        // Without parameters there are no links.
+        let listens = matches!(self.state, SlaveState::WaitCfg | SlaveState::DataExch);
+        Filter { all: false, own: self.identity.address, publishers: if listens { app.publishers() } else { 0 } }
     }
 
     /// The supply came on: everything from before is forgotten, initialisation takes no time.

@@ -154,24 +154,30 @@ type LinkSet = u128;
 /// The delays between the stations of a network, each pair's once.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Delays {
-    stations: usize,
-    /// Half of the matrix is filled: a pair costs the memory, and the cache, only once.
+    /// Half of the matrix is filled, so that a pair costs the cache one place.
     nominal: Vec<Span>,
     /// The links with jitter between two stations, by the order of these links; empty if no link has any.
     unsteady: Vec<LinkSet>,
 }
 
 impl Delays {
+    /// Stations of a row, a power of two that no network reaches.
+    const ROW: usize = 128;
+
     /// The delays between stations at `places`; `unsteady` are the links with jitter.
+    ///
+    /// # Panics
+    /// If there are more stations than addresses.
     pub fn new(tree: &Tree, places: &[Place], unsteady: &[usize]) -> Self {
-        let stations = places.len();
-        let mut delays = Self { stations, nominal: vec![Span::ZERO; stations * stations], unsteady: Vec::new() };
+        assert!(places.len() < Self::ROW, "{} stations", places.len());
+        let pairs = places.len() * Self::ROW;
+        let mut delays = Self { nominal: vec![Span::ZERO; pairs], unsteady: Vec::new() };
         if !unsteady.is_empty() {
-            delays.unsteady = vec![0; stations * stations];
+            delays.unsteady = vec![0; pairs];
         }
         for (a, &from) in places.iter().enumerate() {
             for (b, &to) in places.iter().enumerate().skip(a) {
-                let pair = delays.pair(a, b);
+                let pair = Self::pair(a, b);
                 delays.nominal[pair] = tree.delay(from, to);
                 if let Some(set) = delays.unsteady.get_mut(pair) {
                     let crossed = tree.path(from.segment, to.segment);
@@ -182,8 +188,8 @@ impl Delays {
         }
         delays
     }
-    const fn pair(&self, a: usize, b: usize) -> usize {
-        if a < b { a * self.stations + b } else { b * self.stations + a }
+    const fn pair(a: usize, b: usize) -> usize {
+        if a < b { a * Self::ROW + b } else { b * Self::ROW + a }
     }
     /// Whether every telegram takes the same time.
     pub const fn is_steady(&self) -> bool {
@@ -192,20 +198,13 @@ impl Delays {
     /// Delay between stations `a` and `b` without jitter.
     #[inline]
     pub fn nominal(&self, a: usize, b: usize) -> Span {
-        self.nominal[self.pair(a, b)]
+        self.nominal[Self::pair(a, b)]
     }
     /// Delay between stations `a` and `b` of a telegram for which the links with jitter strayed by `strays`.
-    #[inline]
     pub fn of(&self, a: usize, b: usize, strays: &[Span]) -> Span {
-        let nominal = self.nominal(a, b);
-        if self.is_steady() { nominal } else { nominal + self.stray(a, b, strays) }
-    }
-    /// The sum of `strays` between stations `a` and `b`. Apart, so that a network without jitter has none of it in its way.
-    #[cold]
-    fn stray(&self, a: usize, b: usize, strays: &[Span]) -> Span {
-        let set = self.unsteady[self.pair(a, b)];
+        let set = self.unsteady.get(Self::pair(a, b)).copied().unwrap_or(0);
         let crossed = strays.iter().enumerate().filter(|(link, _)| set >> link & 1 == 1);
-        crossed.fold(Span::ZERO, |sum, (_, &stray)| sum + stray)
+        crossed.fold(self.nominal(a, b), |delay, (_, &stray)| delay + stray)
     }
 }
 

@@ -61,17 +61,31 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
         dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::PRM_STRUCTURE)
             .with(DpV1Status::ISOM_REQ, clocked)
             .with(DpV1Status::FAIL_SAFE, slave.device.fail_safe)
-            .with(DpV1Status::PUBLISHER_ENABLE, publisher),
-        blocks: &[],
+            .with(DpV1Status::PUBLISHER_ENABLE, publisher)
+            | preset_status(slave),
+        blocks: preset_blocks(slave),
     };
     let builder = PrmBuilder::new(&prm).and_then(|builder| {
-        let builder = if slave.device.subscriber { Some(builder) } else { builder.user_81(&user_block(slave)) }?;
+        let own = !slave.device.subscriber && preset_blocks(slave).is_empty();
+        let builder = if own { builder.user_81(&user_block(slave)) } else { Some(builder) }?;
         let builder = if clocked { builder.iso_m(&iso_block(scenario, slave))? } else { builder };
         let (links, subscriptions) = tables_of(scenario, slave.address);
         let builder = if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }?;
         if subscriptions.is_empty() { Some(builder) } else { builder.dxb_subscriptions(&subscriptions) }
     });
     builder.expect("a checked scenario fits into Set_Prm").octets().to_vec()
+}
+
+/// DPV1_Status as a GSD file presets it, without what the configuration tool decides and what is reserved.
+fn preset_status(slave: &Slave) -> DpV1Status {
+    let preset = slave.user_prm.first_chunk().map_or(DpV1Status::default(), |&octets| DpV1Status::from_octets(octets));
+    let [_, check_cfg_mode, _] = DpV1Status::CHECK_CFG_MODE.octets();
+    let [_, octet_9, _] = preset.octets();
+    DpV1Status::from_octets([0, preset.alarms() | octet_9 & check_cfg_mode, preset.alarm_mode()])
+}
+/// The blocks of a GSD file's user parameters.
+fn preset_blocks(slave: &Slave) -> &[u8] {
+    slave.user_prm.get(3..).unwrap_or_default()
 }
 
 fn user_block(slave: &Slave) -> UserPrm81 {

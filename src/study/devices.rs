@@ -33,6 +33,7 @@ pub fn list() -> String {
     lines.extend(aligned(&["name", "what it is"], &[0, 1], &PROFILES.iter().map(titles).collect::<Vec<_>>()));
     lines.push(String::new());
     lines.push("in, out: octets; rates in bit/s; everything about one device: isodp devices NAME".to_owned());
+    lines.push("others come from GSD files, device = { gsd = \"FILE\" }; what one says: isodp gsd FILE".to_owned());
     text(&lines)
 }
 
@@ -100,7 +101,7 @@ fn links(profile: &Profile) -> String {
     if !profile.subscriber {
         return "none, it does not subscribe".to_owned();
     }
-    let DxbLimits { links, data, slots } = profile.dxb;
+    let DxbLimits { links, data, slots, .. } = profile.dxb;
     format!("up to {links}, samples up to {data} octets; subscriber table: slots 1 to {slots} of {data} octets")
 }
 

@@ -6,6 +6,7 @@ pub mod build;
 pub mod count;
 pub mod devices;
 pub mod export;
+pub mod gsd;
 pub mod histogram;
 pub mod layout;
 pub mod metric;

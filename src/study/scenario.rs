@@ -12,6 +12,7 @@ mod class2;
 pub mod error;
 #[cfg(test)]
 mod faults;
+mod gsd;
 pub mod kinds;
 mod link;
 mod options;
@@ -41,7 +42,7 @@ use crate::wire::control::GlobalControl;
 pub use crate::wire::parameter::Format;
 pub use class1::Class1;
 use section::Reader;
-pub(super) use section::suggestion;
+pub(super) use section::{nearest, suggestion};
 pub use services::{MasterServices, SlaveServices};
 use std::fs::File;
 use std::io::Read;
@@ -92,22 +93,36 @@ impl Scenario {
     /// The file cannot be read, is no text, too long or empty, or [`Self::parse`] finds something wrong.
     pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
         let source = path.display().to_string();
-        let octets = read_file(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
+        let octets = read_file(path, "scenario", "name one scenario file in it, *.toml")
+            .map_err(|fault| ScenarioError::about_file(&source, fault))?;
         let text = decode(&octets).map_err(|fault| ScenarioError::about_file(&source, fault))?;
         let name = name_of(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
-        Self::parse(&name, &source, text, overrides)
+        Self::parse_in(path.parent().unwrap_or(Path::new("")), &name, &source, text, overrides)
     }
 
-    /// Reads `text` as the scenario `name`; messages call it `source`. `overrides` as for [`Self::load`].
+    /// Reads `text` as the scenario `name`; messages call it `source`, and GSD files are looked for beside it.
+    /// `overrides` as for [`Self::load`].
     ///
     /// # Errors
     /// The text is no TOML, a key is unknown, missing or wrong, or a rule of the bus or of a device is broken.
     pub fn parse(name: &str, source: &str, text: &str, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        let dir = Path::new(source).parent().unwrap_or(Path::new(""));
+        Self::parse_in(dir, name, source, text, overrides)
+    }
+
+    /// As [`Self::parse`] with the directory in which GSD files are looked for.
+    fn parse_in(
+        dir: &Path,
+        name: &str,
+        source: &str,
+        text: &str,
+        overrides: &[(String, String)],
+    ) -> Result<Self, ScenarioError> {
         if text.trim().is_empty() {
             let fault = Fault::new("the scenario is empty").help("it needs [run], [bus], [master] and a [[slave]]");
             return Err(ScenarioError::about_file(source, fault));
         }
-        let source = Source::new(source, text, overrides);
+        let source = Source::new(source, text, overrides).in_dir(dir);
         let root = source.parse()?;
         let mut reader = Reader::new(&source);
         let read = read::scenario(&mut reader, root);
@@ -136,8 +151,8 @@ impl Scenario {
     }
 }
 
-/// The octets of the file `path`.
-fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
+/// The octets of the file `path`, which is a `noun`; `in_directory` says what to name instead of a directory.
+pub(super) fn read_file(path: &Path, noun: &str, in_directory: &str) -> Result<Vec<u8>, Fault> {
     let unreadable = |error: std::io::Error| {
         Fault::new(match error.kind() {
             std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
@@ -147,10 +162,10 @@ fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
     };
     let metadata = std::fs::metadata(path).map_err(unreadable)?;
     if metadata.is_dir() {
-        return Err(Fault::new("this is a directory").help("name one scenario file in it, *.toml"));
+        return Err(Fault::new("this is a directory").help(in_directory));
     }
     let too_long = |megabytes: u64| {
-        Fault::new(format!("a {megabytes} MB file is no scenario")).rule("a scenario has at most 4 MB")
+        Fault::new(format!("a {megabytes} MB file is no {noun}")).rule(format!("a {noun} has at most 4 MB"))
     };
     if metadata.len() > Scenario::MAX_FILE {
         return Err(too_long(metadata.len().div_ceil(1_000_000)));
@@ -353,6 +368,9 @@ pub struct Slave {
     pub services: SlaveServices,
     /// Where it differs from the model's defaults (Model: D11, D12, D14 to D16, D18, D21).
     pub options: UnitOptions,
+    /// User parameters of a device from a GSD file, with what the scenario sets: Set_Prm from octet 8 on, before what
+    /// the configuration tool adds. Empty for the other devices.
+    pub user_prm: Vec<u8>,
 }
 
 impl Slave {
@@ -542,6 +560,7 @@ pub(crate) mod tests {
             powered_at: Span::ZERO,
             services: SlaveServices::default(),
             options: UnitOptions::default(),
+            user_prm: Vec::new(),
         };
         Scenario {
             name: "network".into(),

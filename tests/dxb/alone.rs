@@ -12,6 +12,9 @@ use isodp::wire::link_status::LinkStatus;
 use isodp::wire::prm::{DpV1Status, DxbLink, DxbSubscription, PrmBuilder, SetPrm, StationStatus};
 use isodp::wire::{Address, Fcb, Frame, FrameControl, Header, Sap, Service, StationType, Status, Telegram};
 
+use proptest::collection::vec;
+use proptest::prelude::*;
+
 use crate::support::address;
 
 const MASTER: u8 = 2;
@@ -307,6 +310,53 @@ fn leaving_data_exchange_ends_all_links() {
     unlock[0] = 0x40;
     bench.srd(Sap::SET_PRM, &unlock);
     assert_eq!((bench.due, bench.drive.filter().publishers, bench.diag().len()), (None, 0, 6));
+}
+
+#[test]
+fn a_drive_without_configuration_listens_to_nobody() {
+    let mut bench = Bench::new();
+    bench.srd(Sap::SET_PRM, &prm(&[link(3, 12, 4, 4)], &[]));
+    assert_eq!(bench.drive.filter().publishers, 1 << 3);
+    bench.srd(Sap::CHK_CFG, &[0xC3]);
+    assert_eq!((bench.drive.slave().state(), bench.drive.filter().publishers), (SlaveState::WaitPrm, 0));
+}
+
+proptest! {
+    /// Whatever the tables say, a drive refuses them or copies within its areas.
+    #[test]
+    fn no_table_makes_a_drive_panic(
+        entries in vec((2..6u8, 1..20u8, 0..8u8, 0..4u8, any::<u8>(), 0..12u8), 0..6),
+        links in 0..6usize,
+        noise in vec(any::<u8>(), 0..40),
+        lengths in vec((2..6u8, 0..20usize), 0..20),
+    ) {
+        let entry = |&(publisher, length, offset, .., sample): &(u8, u8, u8, u8, u8, u8)| link(publisher, length, offset, sample);
+        let (links, subscriptions) = entries.split_at(links.min(entries.len()));
+        let links: Vec<_> = links.iter().map(entry).collect();
+        let to = |from: &(u8, u8, u8, u8, u8, u8)| DxbSubscription { link: entry(from), slot: from.3, destination: from.4 };
+        let subscriptions: Vec<_> = subscriptions.iter().map(to).collect();
+        let good = prm(&links, &subscriptions);
+        for prm in [good.clone(), [&good[..], &noise].concat(), [&good[..10], &noise].concat()] {
+            let mut bench = Bench::new();
+            bench.srd(Sap::SET_PRM, &prm);
+            bench.srd(Sap::CHK_CFG, &CFG);
+            let exchanging = bench.drive.slave().state() == SlaveState::DataExch;
+            for &(publisher, length) in &lengths {
+                if bench.drive.filter().publishers >> publisher & 1 == 1 {
+                    prop_assert!(exchanging);
+                    bench.publish(publisher, &[0xEE; 20][..length]);
+                    bench.advance(Span::from_ms(30));
+                    let status = bench.status(publisher);
+                    prop_assert!(matches!(status, 0x40 | 0x41 | 0x81), "{status:02X}");
+                }
+            }
+            if exchanging {
+                bench.advance(WATCHDOG);
+                prop_assert!(bench.drive.function().statuses().all(|(_, status)| status.0 & !1 == 0));
+                prop_assert!(bench.diag().len() <= 68);
+            }
+        }
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use super::class1;
 use super::class2;
 use super::error::Fault;
+use super::gsd;
 use super::kinds::jitter_bound;
 use super::section::Reader;
 use super::services;
@@ -34,7 +35,7 @@ pub(super) struct Facts<'a> {
 const STAGES: &[(&[Rule], &[Rule])] = &[
     (&[], &[some_slave, own_addresses, class1::owners, addresses_within_hsa, wiring, crystals, run_length]),
     (&[], &[class2::slaves]),
-    (&[isochronous_rate], &[bus_parameters, device_max_tsdr, own_t_sdr]),
+    (&[isochronous_rate], &[gsd::device_rates, bus_parameters, device_max_tsdr, own_t_sdr]),
     (&[t_dp_limits, t_dp_grid, t_dp_content], &[t_mapc, watchdog_outlasts_t_dp]),
     (&[services::slave_interval], &[services::data_control_time, services::sync_and_freeze]),
     (&[], &[encoder_parameters, resolution]),
@@ -43,7 +44,18 @@ const STAGES: &[(&[Rule], &[Rule])] = &[
     (&[jitter_fits], &[functions, code_sequence, units_per_rev, total_range, cycles_fit]),
     (&[], &[publishers, subscribers, samples, link_counts, link_watchdog]),
     (&[], &[sample_lengths, destinations, told_lengths]),
-    (&[], &[event_stations, class1::event_stations, event_instants, disturbance_stations, services::commands]),
+    (&[], &[gsd::set_prm_length]),
+    (
+        &[],
+        &[
+            event_stations,
+            class1::event_stations,
+            gsd::acyclic_devices,
+            event_instants,
+            disturbance_stations,
+            services::commands,
+        ],
+    ),
     (&[start_up], &[]),
 ];
 
@@ -698,7 +710,7 @@ fn link_counts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
         let mut own = all.iter().filter(|(_, link, _)| link.subscriber == slave.address);
         if let Some((path, ..)) = own.nth(most) {
             let fault = Fault::new(format!("slave {} has more than {most} links", slave.address))
-                .rule(format!("a subscriber has up to {most} links, each sample is one (DXB_Max_Link_Count)"));
+                .rule(format!("a subscriber has up to {most} links (GSD: DXB_Max_Link_Count), each sample is one"));
             about(reader, &format!("link.{}.subscriber", number_of(path)), &[], fault);
         }
     }

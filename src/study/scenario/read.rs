@@ -4,10 +4,11 @@ use super::acyclic;
 use super::class1;
 use super::class2;
 use super::error::Fault;
+use super::gsd;
 use super::kinds::{self, ACTIONS, DISTURBANCES, Kind, address};
 use super::link::link;
 use super::options;
-use super::section::{Reader, Section, choice, cycle_time, instant, number, quantity, suggestion, text, yes};
+use super::section::{Reader, Section, cycle_time, instant, number, quantity, suggestion, text, yes};
 use super::services;
 use super::topology::{self, cable, spread, station_segment};
 use super::tree::{Node, Place, Table, Value};
@@ -15,7 +16,7 @@ use super::{
     Action, Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Master, Record, Run, Scaling,
     Scenario, Slave, Topology, Watchdog, When,
 };
-use crate::device::profile::{Device, PROFILES, Profile};
+use crate::device::profile::Profile;
 use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
 use crate::sim::motion::{Angle, Motion};
@@ -469,9 +470,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let rate = context.bus.map_or(BitRate::M12, |bus| bus.params.rate);
     let mut section = Section::new(format!("slave.{}", from.address), from.place, Some(&from.table));
     let s = &mut section;
-    let device = s.required(reader, "device", &format!("\"{}\"", PROFILES[0].name), |node| {
-        choice(node, "device", PROFILES, |profile| &profile.name)
-    });
+    let kind = gsd::device(s, reader);
     let segment = station_segment(s, reader, context.topology);
     let position_mm = s.optional(reader, "position", cable).unwrap_or(context.position_mm);
     let crystal = crystal(reader, s);
@@ -496,6 +495,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let functions = s.optional(reader, "functions", yes).unwrap_or(scaling.is_some());
     let silent = s.optional(reader, "silent", yes).unwrap_or(false);
     let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
+    let user_prm = gsd::user_prm(kind.as_ref(), s, reader);
     let services = services::slave(s, reader);
     section.finish(reader);
     let times = if clocked {
@@ -503,9 +503,9 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     } else {
         Some(class1::UNCLOCKED)
     };
-    let (device, bus) = (Device::from(device?), context.bus?);
+    let (device, bus) = (kind?.device, context.bus?);
     let t_sdr = t_sdr.unwrap_or_else(|| default_t_sdr(bus, &device));
-    Some(Slave {
+    let mut slave = Slave {
         address: from.address,
         master: master?,
         device,
@@ -523,7 +523,12 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
         powered_at,
         services,
         options,
-    })
+        user_prm: Vec::new(),
+    };
+    if let Some(user_prm) = user_prm {
+        user_prm.apply(&mut slave);
+    }
+    Some(slave)
 }
 
 /// The times in force; T_I and T_O must come from the slave or from `[master]`, if that could be read (`master`).
