@@ -403,6 +403,17 @@ pub enum Observation {
         /// From whom.
         slave: Address,
     },
+    /// A slave left data exchange against the master's will: it refused (RS), answered nonsense, was silent for too long,
+    /// or said so in its diagnosis. `Handler` tells that the master starts over, also where it does so of its own accord.
+    Lost {
+        /// Which.
+        slave: Address,
+    },
+    /// A slave's diagnosis was read. What it says is told by `Diagnosis`, if that is new.
+    DiagnosisRead {
+        /// Whose.
+        slave: Address,
+    },
     /// A slave's diagnosis as the master read it.
     Diagnosis {
         /// Whose.
@@ -736,7 +747,8 @@ pub struct Inputs {
 }
 
 impl Observation {
-    /// Whether this happens rarely and belongs into a log of events, rather than once or more in every cycle.
+    /// Whether this happens rarely and belongs into a log of events, rather than once or more in every cycle or in
+    /// words that another event has already.
     pub const fn is_event(&self) -> bool {
         !matches!(
             self,
@@ -751,6 +763,8 @@ impl Observation {
                 | Self::Used { .. }
                 | Self::AcyclicDone { .. }
                 | Self::Gap { .. }
+                | Self::Lost { .. }
+                | Self::DiagnosisRead { .. }
                 | Self::TokenReceived { .. }
         )
     }
@@ -824,6 +838,8 @@ impl fmt::Display for Observation {
             Self::Retry { slave } => write!(f, "slave {slave}: request repeated"),
             Self::NoAnswer { slave } => write!(f, "slave {slave}: no answer"),
             Self::IllegalAnswer { slave } => write!(f, "slave {slave}: illegal answer"),
+            Self::Lost { slave } => write!(f, "slave {slave}: left data exchange"),
+            Self::DiagnosisRead { slave } => write!(f, "slave {slave}: diagnosis read"),
             Self::Diagnosis { .. }
             | Self::ExtendedDiagnosis { .. }
             | Self::DiagnosisDue { .. }

@@ -242,11 +242,15 @@ impl Handler {
                 }
             };
         let joined = next == HandlerState::DataExchange && !self.exchanges();
+        if self.exchanges() && next != HandlerState::DataExchange {
+            out.observe(Observation::Lost { slave: self.params.address });
+        }
         self.enter(next, out);
         joined
     }
     fn diagnosis(&mut self, du: &[u8], out: &mut Outbox) -> Option<DiagStatus> {
         let diagnosis = Diagnosis::parse(du).ok()?;
+        out.observe(Observation::DiagnosisRead { slave: self.params.address });
         let [a, b, c, ..] = diagnosis.emit();
         // During data exchange it is read because something changed.
         if self.reported != Some([a, b, c]) || self.exchanges() {
@@ -273,6 +277,7 @@ impl Handler {
     }
     /// Data_Exchange was refused. Tells whether the slave was given up: always.
     pub fn refused(&mut self, out: &mut Outbox) -> bool {
+        out.observe(Observation::Lost { slave: self.params.address });
         self.enter(HandlerState::Diagnose, out);
         true
     }
@@ -437,13 +442,57 @@ mod tests {
         let first = [0x0A, 0x83, 0, 0, 6, 1, 7, 1];
         let seen: Vec<_> = out.observations().copied().collect();
         let status = [0x00, 0x0C, 0x00];
-        let expected =
-            [Observation::Diagnosis { slave, status }, Observation::ExtendedDiagnosis { slave, length: 10, first }];
+        let expected = [
+            Observation::DiagnosisRead { slave },
+            Observation::Diagnosis { slave, status },
+            Observation::ExtendedDiagnosis { slave, length: 10, first },
+        ];
         assert_eq!(seen, expected);
         out.clear();
         handler.answered(Answer::Data(&READY), &mut out);
         let gone = Observation::ExtendedDiagnosis { slave, length: 0, first: [0; 8] };
         assert_eq!(out.observations().last(), Some(&gone));
+    }
+
+    /// Every way out of data exchange that the master does not want, and one that it wants.
+    #[test]
+    fn lost_is_said_where_a_slave_leaves_against_the_masters_will() {
+        let losses = |leave: &dyn Fn(&mut Handler, &mut Outbox)| {
+            let (mut handler, mut out) = (in_state(HandlerState::DataExchange), Outbox::new());
+            leave(&mut handler, &mut out);
+            assert!(!handler.exchanges());
+            out.observations().filter(|what| matches!(what, Observation::Lost { .. })).count()
+        };
+        let not_ready = [0x02, 0x05, 0x00, 0xFF, 0x80, 0xF9];
+        assert_eq!(
+            losses(&|handler, out| {
+                handler.refused(out);
+            }),
+            1,
+            "RS"
+        );
+        assert_eq!(
+            losses(&|handler, out| {
+                handler.missed(1, out);
+            }),
+            1,
+            "silence"
+        );
+        assert_eq!(
+            losses(&|handler, out| {
+                handler.answered(Answer::Data(&not_ready), out);
+            }),
+            1,
+            "diagnosis"
+        );
+        assert_eq!(
+            losses(&|handler, out| {
+                handler.answered(Answer::Refused(Status::Rs), out);
+            }),
+            1,
+            "nonsense"
+        );
+        assert_eq!(losses(&|handler, out| handler.restart(out)), 0, "the master's own will");
     }
 
     #[test]

@@ -42,6 +42,10 @@ pub struct Wiring {
 }
 
 impl Wiring {
+    /// One segment of cable.
+    pub fn line() -> Self {
+        Self { tree: Tree::line(), jitter: Vec::new() }
+    }
     /// The bus of stations at `places`.
     fn bus(self, places: &[Place]) -> Bus {
         let (unsteady, jitter): (Vec<_>, Vec<_>) = self.jitter.into_iter().unzip();

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::acyclic::AcyclicCounts;
 use super::layout::Layout;
+use super::live_list::{CycleTimes, LiveList};
 use crate::observation::{ClockVerdict, Leds, LinkState, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
@@ -19,6 +20,8 @@ pub struct Counts {
     pub links: Vec<LinkCounts>,
     /// Acyclic services, by the class of the master.
     pub acyclic: AcyclicCounts,
+    /// Per address, as a bus analyser counts.
+    pub live_list: LiveList,
 }
 
 /// What is counted for the network as a whole.
@@ -28,6 +31,8 @@ pub struct NetworkCounts {
     pub duration: Span,
     /// Cycles that began.
     pub cycles: u64,
+    /// How long they took.
+    pub cycle_times: CycleTimes,
     /// Requests that the master repeated.
     pub retries: u64,
     /// Requests that stayed without answer after all retries.
@@ -167,6 +172,7 @@ impl Counts {
             slaves,
             links: vec![LinkCounts::default(); layout.links().len()],
             acyclic: AcyclicCounts::default(),
+            live_list: LiveList::new(layout),
         }
     }
 
@@ -205,8 +211,9 @@ impl Counts {
         }
     }
 
-    /// Counts what any station observed.
-    pub(super) fn station(&mut self, what: &Observation) {
+    /// Counts what any station, `observer`, observed.
+    pub(super) fn station(&mut self, observer: Address, what: &Observation) {
+        self.live_list.observe(observer, what);
         match what {
             Observation::Collision { .. } => self.network.collisions += 1,
             Observation::Disturbed { .. } => self.network.disturbed += 1,

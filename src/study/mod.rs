@@ -9,6 +9,7 @@ pub mod export;
 pub mod gsd;
 pub mod histogram;
 pub mod layout;
+pub mod live_list;
 pub mod metric;
 pub mod plan;
 pub mod plot;

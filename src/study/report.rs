@@ -1,7 +1,8 @@
 //! Report: the summary of a run as text that fits a screen.
 
 use super::acyclic::AcyclicSummary;
-use super::summary::{Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, Summary};
+use super::live_list::Seen;
+use super::summary::{Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, StationSummary, Summary};
 use crate::observation::Leds;
 use crate::time::Span;
 
@@ -9,6 +10,8 @@ use crate::time::Span;
 pub const SLAVES: usize = 16;
 /// Links that are shown; of more, the slowest.
 pub const LINKS: usize = 8;
+/// Stations of the live list that are shown, of those that are remarkable; of more, the worst.
+pub const STATIONS: usize = 4;
 
 /// The summary as text; `dir` is where its files are, none if there are none.
 pub fn render(summary: &Summary, dir: Option<&str>) -> String {
@@ -17,6 +20,7 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     topology(summary, &mut lines);
     slaves(summary, &mut lines);
     leds(summary, &mut lines);
+    live_list(summary, &mut lines);
     spread(summary, &mut lines);
     links(summary, &mut lines);
     acyclic(summary, &mut lines);
@@ -151,6 +155,67 @@ pub(super) fn ranges(numbers: &[u8]) -> String {
     numbers.chunk_by(|a, b| a + 1 == *b).map(part).collect::<Vec<_>>().join(", ")
 }
 
+/// The counters of a bus analyser: all together, and those of the stations where there is something to look at.
+fn live_list(summary: &Summary, lines: &mut Vec<String>) {
+    let total = |count: fn(&StationSummary) -> u64| summary.live_list.iter().map(count).sum::<u64>();
+    let timing = &summary.timing;
+    let mut shown: Vec<_> = summary.live_list.iter().filter(|station| station.is_remarkable()).collect();
+    let more = shown.len().saturating_sub(STATIONS);
+    lines.push(String::new());
+    lines.push(format!(
+        "live list: {}, lost {}, syncs {}, repeats {}, illegal {}, diagnoses {}   cycle time {}, mean {}",
+        number(summary.live_list.len(), "station"),
+        total(|station| station.lost),
+        total(|station| station.syncs),
+        total(|station| station.repeats),
+        total(|station| station.illegal_responses),
+        total(|station| station.diagnoses),
+        range(timing.cycle_min, timing.cycle_max),
+        span(timing.cycle_mean),
+    ));
+    if shown.is_empty() {
+        return;
+    }
+    if more > 0 {
+        shown.sort_by_key(|station| std::cmp::Reverse(rank(station)));
+        shown.truncate(STATIONS);
+        shown.sort_by_key(|station| station.address);
+    }
+    let rows: Vec<_> = shown.iter().map(|station| station_cells(station)).collect();
+    lines.extend(aligned(STATION_HEADER, &[1], &rows));
+    if more > 0 {
+        lines.push(format!("the {STATIONS} worst stations; {more} more are remarkable, see live-list.txt"));
+    }
+}
+
+/// The whole live list, a line per station.
+pub(super) fn live_list_of_all(summary: &Summary) -> String {
+    let rows: Vec<_> = summary.live_list.iter().map(station_cells).collect();
+    aligned(STATION_HEADER, &[1], &rows).iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
+}
+
+/// What makes a station worse than another: not being there, then losses, then its worst state, then its answers.
+fn rank(station: &StationSummary) -> (bool, u64, Seen, u64) {
+    (station.seen == Seen::Missing, station.lost, station.seen, station.illegal_responses + station.repeats)
+}
+
+/// Titles over [`station_cells`].
+const STATION_HEADER: &[&str] =
+    &["station", "worst state", "lost", "syncs", "repeats", "most in a cycle", "illegal", "diagnoses"];
+
+fn station_cells(station: &StationSummary) -> Vec<String> {
+    let counts = [
+        station.lost,
+        station.syncs,
+        station.repeats,
+        station.repeats_max_per_cycle,
+        station.illegal_responses,
+        station.diagnoses,
+    ];
+    let names = [station.address.to_string(), station.seen.text().to_owned()];
+    names.into_iter().chain(counts.iter().map(u64::to_string)).collect()
+}
+
 fn spread(summary: &Summary, lines: &mut Vec<String>) {
     let Some(skew) = summary.distribution("latch_skew").filter(|skew| skew.count > 0) else { return };
     let steps = summary.counts.skew_max_steps.map_or_else(String::new, |steps| format!(", {steps:.3} steps"));
@@ -265,7 +330,8 @@ fn at(word: &str, limit: Option<Span>) -> String {
     limit.map_or_else(|| "-".to_owned(), |limit| format!("{word} {limit}"))
 }
 fn range(low: Option<Span>, high: Option<Span>) -> String {
-    if low == high { span(low) } else { format!("{} to {}", span(low), span(high)) }
+    let (low, high) = (span(low), span(high));
+    if low == high { low } else { format!("{low} to {high}") }
 }
 /// `1 slave`, `2 slaves`, `3 retries`.
 fn number(count: impl TryInto<u64>, noun: &str) -> String {
@@ -288,6 +354,9 @@ mod tests {
         let (slave, link) = (summary.slaves[1].clone(), summary.links[0].clone());
         summary.slaves =
             (3..3 + slaves).map(|address| SlaveSummary { address, faults: Vec::new(), ..slave.clone() }).collect();
+        let station = summary.live_list[2];
+        let remarkable = |address| StationSummary { address, lost: u64::from(address) % 10, ..station };
+        summary.live_list = (3..3 + slaves).map(remarkable).collect();
         summary.links = (3..3 + slaves).map(|publisher| LinkSummary { publisher, ..link.clone() }).collect();
         for (number, slave) in summary.slaves.iter_mut().step_by(10).enumerate() {
             slave.faults = vec![("0F04".to_owned(), number as u64)];
@@ -307,6 +376,11 @@ slave  device   state      phase                 lock  PLL error p99     max  la
     3  encoder  POWER_ON   1 configuration          -              -       -                  -      -  -
     5  encoder  DATA_EXCH  5 operation      20 cycles          42 ns  -42 ns              45 ns  45 ns  1 x 0F04
 LEDs red dark, green dark at slave 3: no supply
+
+live list: 3 stations, lost 1, syncs 2, repeats 2, illegal 0, diagnoses 2   cycle time 1 ms to 1.001 ms, mean 1.001 ms
+station  worst state  lost  syncs  repeats  most in a cycle  illegal  diagnoses
+      3  missing         0      0        0                0        0          0
+      5  lost            1      2        2                2        0          2
 
 latch skew: p50 90 ns, p90 90 ns, p99 90 ns, p99.9 90 ns, max 90 ns, 0.250 steps
 
@@ -338,6 +412,27 @@ fingerprint: wire 0123456789abcdef
                 .unwrap_or_else(|| panic!("no {slave} in\n{text}"));
             assert!(line.ends_with(&format!("{} x 0F04", number + 1)), "{line}");
         }
+    }
+
+    #[test]
+    fn of_many_remarkable_stations_the_worst_are_shown() {
+        let mut summary = summary(100);
+        summary.live_list[50].seen = Seen::Missing;
+        let text = render(&summary, None);
+        let rows = text.lines().skip_while(|line| !line.starts_with("station")).skip(1).take(STATIONS);
+        let shown: Vec<&str> = rows.filter_map(|row| row.split_whitespace().next()).collect();
+        assert_eq!(shown, ["9", "19", "29", "53"], "{text}");
+        assert!(text.contains("the 4 worst stations; 96 more are remarkable, see live-list.txt\n"), "{text}");
+    }
+
+    #[test]
+    fn a_network_without_trouble_needs_one_line() {
+        let mut summary = sample::run();
+        let good = StationSummary { seen: Seen::Exchanging, lost: 0, syncs: 1, repeats: 0, ..summary.live_list[2] };
+        summary.live_list = vec![StationSummary { seen: Seen::Master, syncs: 0, ..good }, good];
+        let text = render(&summary, None);
+        assert!(text.contains("\nlive list: 2 stations, lost 0, syncs 1, repeats 0,"), "{text}");
+        assert!(!text.contains("worst state"), "{text}");
     }
 
     #[test]

@@ -7,6 +7,7 @@ use super::count::{Counts, LinkCounts, SlaveCounts};
 use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
+use super::live_list::{Seen, Station};
 use crate::observation::Leds;
 use crate::time::{BitRate, Span};
 use crate::wire::Address;
@@ -36,6 +37,8 @@ pub struct Summary {
     pub slaves: Vec<SlaveSummary>,
     /// Per link, by publisher, then subscriber.
     pub links: Vec<LinkSummary>,
+    /// Every station that was seen or looked for, in address order.
+    pub live_list: Vec<StationSummary>,
     /// Acyclic services per class of master; none before [`Summary::show_acyclic`].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub acyclic: Vec<AcyclicSummary>,
@@ -123,6 +126,15 @@ pub struct Timing {
     /// Largest T_O.
     #[serde(rename = "t_o_max_us", serialize_with = "us_or_null")]
     pub t_o_max: Option<Span>,
+    /// Shortest true time between two cycle starts at the master.
+    #[serde(rename = "cycle_time_min_us", serialize_with = "us_or_null")]
+    pub cycle_min: Option<Span>,
+    /// Mean of the same.
+    #[serde(rename = "cycle_time_mean_us", serialize_with = "us_or_null")]
+    pub cycle_mean: Option<Span>,
+    /// Longest of the same.
+    #[serde(rename = "cycle_time_max_us", serialize_with = "us_or_null")]
+    pub cycle_max: Option<Span>,
 }
 
 /// What happened how often in the network.
@@ -242,6 +254,49 @@ pub struct SlaveSummary {
     /// Distributions of the slave's quantities, by name.
     #[serde(serialize_with = "map")]
     pub distributions: Vec<(&'static str, Distribution)>,
+}
+
+/// One line of the live list; what each figure counts is told by [`Station`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct StationSummary {
+    /// Its address.
+    pub address: u8,
+    /// What it was seen as at worst.
+    #[serde(rename = "worst_state", serialize_with = "seen")]
+    pub seen: Seen,
+    /// How often it left data exchange against its master's will.
+    pub lost: u64,
+    /// How often it was brought into data exchange.
+    pub syncs: u64,
+    /// Repeated requests.
+    pub repeats: u64,
+    /// Most of them in one cycle.
+    pub repeats_max_per_cycle: u64,
+    /// Answers that do not fit their request.
+    pub illegal_responses: u64,
+    /// Diagnoses read.
+    pub diagnoses: u64,
+}
+
+impl StationSummary {
+    /// Whether there is something to look at: it is not where it should be, was started more than once, or did not answer
+    /// as it should.
+    pub const fn is_remarkable(&self) -> bool {
+        self.seen.is_bad() || self.lost > 0 || self.syncs > 1 || self.repeats > 0 || self.illegal_responses > 0
+    }
+    fn of((address, station): (u8, &Station)) -> Option<Self> {
+        let &Station { lost, syncs, repeats, most_repeats, illegal, diagnoses, .. } = station;
+        Some(Self {
+            address,
+            seen: station.seen?,
+            lost,
+            syncs,
+            repeats,
+            repeats_max_per_cycle: most_repeats,
+            illegal_responses: illegal,
+            diagnoses,
+        })
+    }
 }
 
 /// What the two LEDs of a slave show (manual 5.2).
@@ -368,12 +423,13 @@ impl Summary {
             distributions: distributions(histograms, Subject::Link(publisher, subscriber)),
         };
         Self {
-            timing: timing(&facts, histograms),
+            timing: timing(&facts, counts, histograms),
             counts: happened(counts),
             ring: Ring::of(counts),
             distributions: distributions(histograms, Subject::Network),
             slaves: (0..facts.slaves.len()).map(|index| slave(index, &facts, counts, histograms)).collect(),
             links: layout.links().iter().map(link).collect(),
+            live_list: counts.live_list.stations().filter_map(StationSummary::of).collect(),
             acyclic: Vec::new(),
             network: Network {
                 scenario: facts.scenario,
@@ -447,7 +503,9 @@ fn distributions(histograms: &Histograms, subject: Subject) -> Vec<(&'static str
     QUANTITIES.iter().filter_map(|quantity| of(quantity.name)).collect()
 }
 
-fn timing(facts: &Facts, histograms: &Histograms) -> Timing {
+fn timing(facts: &Facts, counts: &Counts, histograms: &Histograms) -> Timing {
+    let cycles = counts.network.cycle_times;
+    let some = |time| (cycles.count > 0).then_some(time);
     let layout = histograms.layout();
     let network = |name| histograms.get(name, Subject::Network);
     let t_dx_max = network("t_dx").and_then(Histogram::max);
@@ -462,6 +520,9 @@ fn timing(facts: &Facts, histograms: &Histograms) -> Timing {
         t_i_max: t_i().max(),
         t_o_min: t_o().min(),
         t_o_max: t_o().max(),
+        cycle_min: some(cycles.min),
+        cycle_mean: cycles.mean(),
+        cycle_max: some(cycles.max),
     }
 }
 
@@ -514,6 +575,10 @@ const fn is_zero(count: &u64) -> bool {
 }
 fn map<S: Serializer, K: Serialize, V: Serialize>(entries: &[(K, V)], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(entries.iter().map(|(key, value)| (key, value)))
+}
+#[allow(clippy::trivially_copy_pass_by_ref)] // As serde asks for it.
+fn seen<S: Serializer>(seen: &Seen, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(seen.text())
 }
 fn phases<S: Serializer>(phases: &[(&'static str, Span)], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(phases.iter().map(|&(phase, span)| (phase, Decimal::ms(span))))
