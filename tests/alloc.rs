@@ -82,6 +82,11 @@ fn a_token_that_goes_round_allocates_nothing() {
 }
 
 #[test]
+fn class_2_masters_allocate_nothing() {
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("class2-beside", &[])), 0);
+}
+
+#[test]
 fn links_in_both_tables_and_a_lost_publisher_allocate_nothing() {
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-network", &[])), 0);
     let sets = [("run.duration", "5 s"), ("event.1.at", "2.2 s"), ("event.2.at", "4.5 s")];

@@ -1,5 +1,6 @@
 //! The tests of the whole, in one binary.
 
+mod acyclic;
 mod cli;
 mod determinism;
 mod devices;

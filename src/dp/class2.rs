@@ -308,3 +308,6 @@ impl<A: Application> Station for Class2<A> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

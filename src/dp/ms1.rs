@@ -175,7 +175,7 @@ pub fn result(answer: Result<&[u8], Failure>) -> AcyclicResult {
 #[derive(Clone, Copy)]
 pub struct Pdu {
     octets: [u8; MAX_PDU],
-    len: usize,
+    len: u8,
 }
 impl Pdu {
     /// No octets.
@@ -185,18 +185,18 @@ impl Pdu {
     pub fn of(request: &Request<'_>) -> Self {
         let mut octets = [0; MAX_PDU];
         let len = request.emit(&mut octets).unwrap_or(0);
-        Self { octets, len }
+        Self { octets, len: len as u8 }
     }
     /// These octets, at most [`MAX_PDU`] of them.
     pub fn from_octets(from: &[u8]) -> Self {
         let len = from.len().min(MAX_PDU);
         let mut octets = [0; MAX_PDU];
         octets[..len].copy_from_slice(&from[..len]);
-        Self { octets, len }
+        Self { octets, len: len as u8 }
     }
     /// The octets.
     pub fn octets(&self) -> &[u8] {
-        &self.octets[..self.len]
+        &self.octets[..self.len.into()]
     }
     /// Octets of the longest answer to this request.
     pub fn longest_answer(&self) -> usize {

@@ -125,7 +125,12 @@ fn job(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> Op
         Service::RecordWrite => {
             let record = record(s, reader);
             let data = s.required(reader, "data", "[0x01, 0x02]", octets);
-            record.zip(data).map(|(record, data)| vec![Work::WriteRecord(record, data)])
+            // Zeros behind the octets that are given.
+            let length = s.optional(reader, "length", number(1..=MAX_RECORD)).map(usize::from);
+            record.zip(data).map(|(record, mut data)| {
+                data.resize(length.unwrap_or(data.len()).max(data.len()), 0);
+                vec![Work::WriteRecord(record, data)]
+            })
         }
         Service::Read(service) => Some(vec![Work::Read(service)]),
     };
