@@ -75,6 +75,13 @@ fn a_fault_and_its_acknowledgement_allocate_nothing() {
 }
 
 #[test]
+fn a_token_that_goes_round_allocates_nothing() {
+    for set in [("bus.gap_factor", "20"), ("bus.gap_factor", "1"), ("bus.t_tr", "300000 tbit")] {
+        assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("two-masters", &[set])), 0, "{set:?}");
+    }
+}
+
+#[test]
 fn class_2_masters_allocate_nothing() {
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("class2-beside", &[])), 0);
 }

@@ -19,6 +19,7 @@ mod options;
 mod plan;
 mod props;
 mod rig;
+mod ring;
 mod scenarios;
 mod startup;
 mod support;

@@ -57,6 +57,7 @@ fn every_shipped_scenario_has_a_test_and_says_what_it_asks() {
         crate::dp_services::TESTS,
         crate::dxb::TESTS,
         crate::topology::TESTS,
+        crate::ring::TESTS,
         crate::gsd::TESTS,
         crate::acyclic::TESTS,
     ];

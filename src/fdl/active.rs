@@ -177,6 +177,10 @@ impl Active {
     pub const fn free_at(&self) -> Local {
         self.free_at
     }
+    /// Whatever was sent before, the next request does not begin before `now`.
+    pub fn not_before(&mut self, now: Local) {
+        self.free_at = self.free_at.max(now);
+    }
     /// T_ID1 as a span.
     pub const fn t_id1(&self) -> Span {
         self.t_id1

@@ -152,7 +152,7 @@ impl Ring {
     /// What a poll of the GAP found. Tells whether a station joins: then it is NS.
     pub fn polled(&mut self, address: Address, answer: GapAnswer) -> bool {
         self.gap[usize::from(address.get())] = Some(answer);
-        if answer != GapAnswer::Ready {
+        if answer != GapAnswer::Ready || self.las >> address.get() & 1 == 1 {
             return false;
         }
         self.las |= 1 << address.get();
@@ -282,6 +282,7 @@ mod tests {
             assert_eq!(ring.gap(at(7)), Some(answer));
         }
         assert!(ring.polled(at(7), GapAnswer::Ready) && ring.ns() == at(7));
+        assert!(!ring.polled(at(7), GapAnswer::Ready), "it has joined");
     }
 
     #[test]

@@ -132,6 +132,23 @@ impl Bus {
         }
     }
 
+    /// The station `sender` lost its supply at `now`: what it would have sent later never reaches the line. What is
+    /// under way is finished (Model: a telegram that breaks off would be dropped all the same).
+    pub fn silence(&mut self, sender: usize, now: Time) {
+        let coming = |by: usize, start: Time| by == sender && start > now;
+        for (index, flight) in self.flights.iter_mut().enumerate() {
+            if coming(flight.sender, flight.start) && !self.free.contains(&FlightId(index as u16)) {
+                flight.frame.clear();
+            }
+        }
+        for sent in self.recent.iter_mut().filter(|sent| coming(sent.sender, sent.start)) {
+            sent.end = sent.start;
+            if self.busy_by == sender {
+                self.busy_until = self.busy_until.min(now);
+            }
+        }
+    }
+
     /// So many stations will hear the end of this telegram.
     pub fn add_listeners(&mut self, id: FlightId, count: u16) {
         self.flights[usize::from(id.0)].listeners += count;
@@ -212,6 +229,25 @@ mod tests {
         }
         let (c, hit) = bus.send(0, (ns(199), ns(299)), &token());
         assert_eq!((hit, bus.flight(c).frame.octets()), (None, token().octets()));
+    }
+
+    #[test]
+    fn what_a_station_without_supply_had_planned_never_comes() {
+        let mut bus = line();
+        let (running, _) = bus.send(0, (ns(0), ns(100)), &token());
+        bus.add_listeners(running, 1);
+        bus.silence(0, ns(50));
+        assert_eq!(bus.flight(running).frame.octets(), token().octets(), "under way, it is finished");
+        bus.heard(running);
+        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token());
+        bus.add_listeners(planned, 1);
+        bus.silence(1, ns(300));
+        assert!(!bus.flight(planned).frame.is_empty(), "another station's supply");
+        bus.silence(0, ns(300));
+        assert!(bus.flight(planned).frame.is_empty());
+        assert!(!bus.is_busy(ns(550), 0), "the line stays free");
+        let (_, hit) = bus.send(1, (ns(550), ns(650)), &token());
+        assert_eq!(hit, None);
     }
 
     #[test]

@@ -106,6 +106,8 @@ struct Slot<S> {
     address: Address,
     filter: Filter,
     powered: bool,
+    /// When its next cycle begins, once that is known.
+    cycle_at: Option<Time>,
     sample_with_telegrams: bool,
     deadlines: [Deadline; Outbox::DEADLINES],
     /// Number of the station's next event other than a telegram.
@@ -169,6 +171,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 address,
                 filter,
                 powered: false,
+                cycle_at: None,
                 sample_with_telegrams: false,
                 deadlines: [Deadline::default(); Outbox::DEADLINES],
                 number: 0,
@@ -274,11 +277,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Act::PowerOn => {}
             Act::PowerOff => {
                 self.tell(slot, &Observation::Power { on: false }, recorder);
-                let slot = &mut self.slots[slot];
+                let (index, slot) = (slot, &mut self.slots[slot]);
                 slot.powered = false;
+                slot.cycle_at = None;
                 for deadline in &mut slot.deadlines {
                     deadline.due = None;
                 }
+                self.bus.silence(index, self.now);
             }
             Act::Command(command) => self.step(slot, self.local(slot), Input::Command(command), recorder),
         }
@@ -296,7 +301,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let station = &self.slots[slot];
         let sample = if station.sample_with_telegrams { self.raw(slot) } else { 0 };
         let now = self.local(slot);
-        if station.powered {
+        // Without octets it was cut off before it began.
+        if station.powered && !self.bus.flight(id).frame.is_empty() {
             self.out.clear();
             let octets = self.bus.flight(id).frame.octets();
             let input = Input::Telegram(Heard { octets, sample });
@@ -314,7 +320,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
 
     /// A station's cycle begins. Only those of the first station are the network's.
     fn sent<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
-        if slot != Self::CLOCK || !self.slots[slot].powered {
+        if self.slots[slot].cycle_at.take_if(|at| *at == self.now).is_none() {
+            return; // It lost its supply before.
+        }
+        if slot != Self::CLOCK {
             return self.step(slot, self.local(slot), Input::Sent, recorder);
         }
         let cycle = self.clocks;
@@ -377,11 +386,16 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         if let Some(at) = self.out.beginning_cycle() {
             let at = self.slots[slot].site.crystal.to_true(at).max(self.now);
-            self.push(at, Phase::Edge, slot, Event::Sent);
+            self.begin_cycle(slot, at);
         }
         self.transmit(slot, recorder);
     }
 
+    /// The station's cycle begins at `at`.
+    fn begin_cycle(&mut self, slot: usize, at: Time) {
+        self.slots[slot].cycle_at = Some(at);
+        self.push(at, Phase::Edge, slot, Event::Sent);
+    }
     fn arm(queue: &mut Q, slot: &mut Slot<S>, which: usize, at: Local, now: Time) {
         let due = slot.site.crystal.to_true(at).max(now);
         let deadline = &mut slot.deadlines[which];
@@ -417,7 +431,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             .any(|what| what.loses(self.clocks_begun(send.clock), address, send.clock, frame.octets()));
         if send.clock {
             // The master's transmitter runs, whatever becomes of the telegram.
-            self.push(end, Phase::Edge, slot, Event::Sent);
+            self.begin_cycle(slot, end);
         }
         if lost {
             let how = observation::Disturbance::Lost;

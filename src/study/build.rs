@@ -21,7 +21,7 @@ use crate::sim::noise::{JitterSource, LinkJitter, Purpose, Stream};
 use crate::sim::queue::Queue;
 use crate::sim::topology::Place;
 use crate::study::plan::{self, Plan};
-use crate::study::scenario::{self, Action, CodeSequence, Scenario, Slave, When};
+use crate::study::scenario::{self, Action, Class1, CodeSequence, Scenario, Slave, When};
 use crate::time::{Local, Span, Time};
 use crate::wire::Address;
 use crate::wire::drive::G1Stw;
@@ -44,7 +44,9 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
     let publisher = scenario.publishes(slave.address);
     // A publisher's listeners need the time of an idle line (Model: D27).
     let min_tsdr = plan::min_tsdr(bus, publisher);
-    let watchdog = scenario.master.watchdog;
+    let owner = scenario.class1(slave.master);
+    let watchdog = owner.map_or(scenario.master.watchdog, |class1| class1.watchdog);
+    let clocked = scenario.is_clocked(slave);
     let services = slave.services;
     let prm = SetPrm {
         status: (StationStatus::LOCK)
@@ -55,8 +57,9 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
         wd_fact_2: watchdog.map_or(1, |watchdog| watchdog.factor_2),
         min_tsdr: min_tsdr.0.min(u8::MAX.into()) as u8,
         ident: slave.device.ident,
-        group: CLOCK_GROUP | services.groups,
-        dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::ISOM_REQ | DpV1Status::PRM_STRUCTURE)
+        group: if clocked { CLOCK_GROUP } else { 0 } | services.groups,
+        dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::PRM_STRUCTURE)
+            .with(DpV1Status::ISOM_REQ, clocked)
             .with(DpV1Status::FAIL_SAFE, slave.device.fail_safe)
             .with(DpV1Status::PUBLISHER_ENABLE, publisher)
             | preset_status(slave),
@@ -65,7 +68,7 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
     let builder = PrmBuilder::new(&prm).and_then(|builder| {
         let own = !slave.device.subscriber && preset_blocks(slave).is_empty();
         let builder = if own { builder.user_81(&user_block(slave)) } else { Some(builder) }?;
-        let builder = builder.iso_m(&iso_block(scenario, slave))?;
+        let builder = if clocked { builder.iso_m(&iso_block(scenario, slave))? } else { builder };
         let (links, subscriptions) = tables_of(scenario, slave.address);
         let builder = if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }?;
         if subscriptions.is_empty() { Some(builder) } else { builder.dxb_subscriptions(&subscriptions) }
@@ -150,7 +153,7 @@ pub fn slave_params(scenario: &Scenario, slave: &Slave) -> SlaveParams {
         inputs: slave.device.inputs,
         publisher: scenario.publishes(slave.address),
         fail_safe: slave.device.fail_safe,
-        get_cfg: scenario.master.get_cfg,
+        get_cfg: scenario.class1(slave.master).map_or(scenario.master.get_cfg, |class1| class1.get_cfg),
         max_diag: slave.device.max_diag,
         min_interval: slave.min_slave_interval(),
     }
@@ -168,8 +171,15 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
         place: place(scenario, master.address),
         crystal: crystal(seed, master.address, master.crystal),
         shaft: None,
-        powered_at: Time::ZERO,
+        powered_at: Time::ZERO + master.powered_at,
     }];
+    sites.extend(scenario.class1.iter().map(|class1| Site {
+        machine: Node::Master(further_master(scenario, class1)),
+        place: place(scenario, class1.address),
+        crystal: crystal(seed, class1.address, class1.crystal),
+        shaft: None,
+        powered_at: Time::ZERO + class1.powered_at,
+    }));
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
@@ -180,7 +190,7 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
             When::Time(span) => network::When::Time(Time::ZERO + span),
             When::Cycle(cycle) => network::When::Cycle(cycle),
         };
-        for &(station, act) in &acts(master.address, &event.slaves, event.action) {
+        for &(station, act) in &acts(scenario, &event.slaves, event.action) {
             network.order(when, station, act);
         }
     }
@@ -203,13 +213,13 @@ fn place(scenario: &Scenario, station: Address) -> Place {
 fn master_of(scenario: &Scenario) -> Master<Controller> {
     let master = &scenario.master;
     // A station that is no slave to the master is not in its list.
-    let slaves: Vec<&Slave> = scenario.slaves.iter().filter(|slave| !slave.silent).collect();
+    let slaves: Vec<&Slave> = scenario.configured().collect();
     let settings = Settings {
         address: master.address,
         bus: scenario.bus.params,
         t_dp: master.t_dp,
-        pace: Pace::Synch,
-        shared: !scenario.class2.is_empty(),
+        pace: master.pace,
+        shared: !scenario.class1.is_empty() || !scenario.class2.is_empty(),
         rearm: if master.accumulate { Rearm::LastSent } else { Rearm::Grid },
         dx_retries: master.dx_retries,
         lost_after: master.lost_after.min(u16::MAX.into()) as u16,
@@ -223,6 +233,30 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
     let life = LifeSettings { t_mapc: master.t_mapc, start: master.life_start, delay: master.life_delay };
     let addresses = slaves.iter().map(|slave| slave.address);
     Master::new(settings, Controller::new(addresses, life))
+}
+
+/// A free-running master beside `[master]`.
+fn further_master(scenario: &Scenario, class1: &Class1) -> Master<Controller> {
+    let slaves: Vec<&Slave> = scenario.slaves_of(class1.address).collect();
+    let settings = Settings {
+        address: class1.address,
+        bus: scenario.bus.params,
+        // What it is for is the pace of Global_Control.
+        t_dp: class1.least_cycle.max(Span::from_ms(1)),
+        pace: Pace::Free { least: class1.least_cycle },
+        shared: true,
+        rearm: Rearm::Grid,
+        dx_retries: class1.dx_retries,
+        lost_after: class1.lost_after.min(u16::MAX.into()) as u16,
+        clear_for: class1.clear_for,
+        active_spare: false,
+        data_control_time: class1.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
+        auto_clear: false,
+        ms1_timeout: scenario.master.ms1_timeout,
+        slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
+    };
+    let life = LifeSettings { t_mapc: 1, start: 1, delay: 0 };
+    Master::new(settings, Controller::new(slaves.iter().map(|slave| slave.address), life))
 }
 
 /// The scenario's, else the time after which slaves without a master clear their outputs, so that both sides agree.
@@ -303,10 +337,12 @@ fn crystal(seed: u64, station: Address, crystal: scenario::Crystal) -> Crystal {
 }
 
 /// An action as orders to stations.
-fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Act<Command>)> {
+fn acts(scenario: &Scenario, slaves: &[Address], action: Action) -> Vec<(Address, Act<Command>)> {
+    let master = scenario.master.address;
+    let owner = |slave| scenario.slave(slave).map_or(master, |slave| slave.master);
     let to_slaves = |act: Act<Command>| slaves.iter().map(|&slave| (slave, act)).collect();
     let for_slaves = |order: &dyn Fn(Address) -> controller::Command| {
-        slaves.iter().map(|&slave| (master, Act::Command(Command::Application(order(slave))))).collect()
+        slaves.iter().map(|&slave| (owner(slave), Act::Command(Command::Application(order(slave))))).collect()
     };
     match action {
         Action::PowerOff => to_slaves(Act::PowerOff),
@@ -321,7 +357,7 @@ fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Ac
             controller::Command::ChangeParameter(slave, address, format, value)
         }),
         Action::Startup { telegram, patch } => {
-            slaves.iter().map(|&slave| (master, Act::Command(Command::Patch(slave, telegram, patch)))).collect()
+            slaves.iter().map(|&slave| (owner(slave), Act::Command(Command::Patch(slave, telegram, patch)))).collect()
         }
         Action::Clear => vec![(master, Act::Command(Command::Mode(MasterMode::Clear)))],
         Action::Operate => vec![(master, Act::Command(Command::Mode(MasterMode::Operate)))],

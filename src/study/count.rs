@@ -43,6 +43,12 @@ pub struct NetworkCounts {
     pub auto_clears: u64,
     /// SYNCHs that could not be sent when planned.
     pub late_clocks: u64,
+    /// The latest of them.
+    pub latest_clock: Span,
+    /// SYNCHs that were left out because the token was away.
+    pub missed_clocks: u64,
+    /// How long the token took to come round to the master.
+    pub rotation: Rotation,
     /// Tokens claimed after silence, the first one of a run included.
     pub tokens_claimed: u64,
     /// Telegrams that overlapped with another one.
@@ -53,6 +59,31 @@ pub struct NetworkCounts {
     pub events: u64,
     /// Largest latch skew in counts \[steps\]; none if there was no skew.
     pub skew_counts: Option<f64>,
+}
+
+/// T_RR, the time from token to token, of a master in a ring.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Rotation {
+    /// Rotations.
+    pub count: u64,
+    /// The shortest; zero without rotations.
+    pub min: Span,
+    /// The longest.
+    pub max: Span,
+    total: Span,
+}
+
+impl Rotation {
+    fn add(&mut self, t_rr: Span) {
+        self.min = if self.count == 0 { t_rr } else { self.min.min(t_rr) };
+        self.max = self.max.max(t_rr);
+        self.total += t_rr;
+        self.count += 1;
+    }
+    /// The mean; none without rotations.
+    pub fn mean(&self) -> Option<Span> {
+        (self.count > 0).then(|| Span::from_ticks(self.total.ticks() / self.count as i64))
+    }
 }
 
 /// What is counted for one slave.
@@ -150,7 +181,12 @@ impl Counts {
         let slave = |address| layout.slave(address);
         match *what {
             Observation::CycleStart { .. } => self.network.cycles += 1,
-            Observation::ClockLate { .. } => self.network.late_clocks += 1,
+            Observation::ClockLate { by } => {
+                self.network.late_clocks += 1;
+                self.network.latest_clock = self.network.latest_clock.max(by);
+            }
+            Observation::SynchMissed { cycles } => self.network.missed_clocks += cycles,
+            Observation::TokenReceived { t_rr, .. } if t_rr > Span::ZERO => self.network.rotation.add(t_rr),
             Observation::AutoClear { .. } => self.network.auto_clears += 1,
             Observation::DiagnosisDue { slave: address } => {
                 self.network.diagnoses += 1;

@@ -63,6 +63,21 @@ fn network(summary: &Summary, lines: &mut Vec<String>) {
     ];
     let text: Vec<_> = happened.iter().filter(|(count, _)| *count > 0).map(|&(n, what)| number(n, what)).collect();
     lines.push(if text.is_empty() { "nothing went wrong on the bus".to_owned() } else { text.join(", ") });
+    ring(summary, lines);
+}
+
+/// Token rotation and what it did to SYNCH, where the master was not alone.
+fn ring(summary: &Summary, lines: &mut Vec<String>) {
+    let Some(ring) = &summary.ring else { return };
+    let late = if ring.late_clocks > 0 {
+        format!("{} late by up to {}", ring.late_clocks, ring.latest)
+    } else {
+        "never late".to_owned()
+    };
+    lines.push(format!(
+        "token rotation {} in the mean, {} to {}   SYNCH {late}, {} missed",
+        ring.mean, ring.min, ring.max, ring.missed_clocks
+    ));
 }
 
 /// What is doubtful about the cables, and how they are joined if there is more than one.

@@ -221,7 +221,7 @@ fn cycles(scenario: &Scenario) -> u64 {
 
 /// The slaves that take part and their links.
 pub fn layout(scenario: &Scenario) -> Layout {
-    let slaves = scenario.slaves.iter().filter(|slave| !slave.silent);
+    let slaves = scenario.configured();
     let slaves = slaves
         .map(|slave| SlaveLayout { address: slave.address, t_i: slave.times.t_i, encoder: !slave.device.subscriber })
         .collect();
@@ -242,7 +242,7 @@ fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
 }
 
 fn facts(scenario: &Scenario) -> Facts {
-    let slaves = scenario.slaves.iter().filter(|slave| !slave.silent);
+    let slaves = scenario.configured();
     Facts {
         scenario: scenario.name.clone(),
         bit_rate: scenario.bus.params.rate,

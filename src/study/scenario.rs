@@ -7,6 +7,7 @@
 
 mod acyclic;
 mod check;
+mod class1;
 mod class2;
 pub mod error;
 #[cfg(test)]
@@ -30,7 +31,8 @@ pub use station::Station;
 
 use crate::device::options::{Resolution, UnitOptions};
 use crate::device::profile::Device;
-pub use crate::dp::handler::{Patch, StartupTelegram};
+use crate::dp::handler::{Patch, StartupTelegram};
+pub use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
 pub use crate::sim::fault::{Bursts, Disturbance, Service};
 use crate::sim::motion::Motion;
@@ -39,6 +41,7 @@ use crate::time::{Span, Tbit};
 use crate::wire::Address;
 use crate::wire::control::GlobalControl;
 pub use crate::wire::parameter::Format;
+pub use class1::Class1;
 use section::Reader;
 pub(super) use section::{nearest, suggestion};
 pub use services::{MasterServices, SlaveServices};
@@ -61,8 +64,10 @@ pub struct Scenario {
     pub bus: Bus,
     /// Segments of cable and what joins them.
     pub topology: Topology,
-    /// The master of the slaves.
+    /// The master whose figures are taken.
     pub master: Master,
+    /// Further, free-running class 1 masters in the order of the file.
+    pub class1: Vec<Class1>,
     /// The slaves in address order, which is the order of Data_Exchange (Model: D6).
     pub slaves: Vec<Slave>,
     /// Class 2 masters in the order of the file.
@@ -175,7 +180,7 @@ impl Scenario {
     }
     /// The slaves that the master has in its list, in address order: all but the silent ones.
     pub fn configured(&self) -> impl Iterator<Item = &Slave> {
-        self.slaves.iter().filter(|slave| !slave.silent)
+        self.slaves_of(self.master.address)
     }
     /// Whether the slave at `address` is parameterised as publisher.
     pub fn publishes(&self, address: Address) -> bool {
@@ -289,7 +294,11 @@ pub struct Master {
     pub position_mm: u64,
     /// How far its crystal is off.
     pub crystal: Crystal,
-    /// Bus cycle T_DP (manual 3.3.2).
+    /// Whether its cycles begin with SYNCH.
+    pub pace: Pace,
+    /// When its supply comes on.
+    pub powered_at: Span,
+    /// Bus cycle T_DP (manual 3.3.2); without SYNCH the planned cycle.
     pub t_dp: Span,
     /// Master application cycle T_MAPC (T_DP), 1..=14 (manual 3.3.3).
     pub t_mapc: u8,
@@ -364,6 +373,8 @@ impl Watchdog {
 pub struct Slave {
     /// Its address, 0..=125.
     pub address: Address,
+    /// The master that has it in its list.
+    pub master: Address,
     /// What it is.
     pub device: Device,
     /// Index of its segment.
@@ -442,7 +453,8 @@ pub struct Scaling {
 pub struct Event {
     /// When.
     pub when: When,
-    /// Which slaves it is about, in address order; empty for an order to the master alone.
+    /// Which slaves it is about, in address order; empty for an order to the master alone. The supply of masters can
+    /// be switched too.
     pub slaves: Vec<Address>,
     /// What to do.
     pub action: Action,
@@ -569,6 +581,7 @@ pub(crate) mod tests {
         let (t_i, t_o, t_pll_w) = (Span::from_us(125), Span::from_ms(4), Span::from_us(1));
         let slave = |number| Slave {
             address: address(number),
+            master: address(2),
             device: device.clone(),
             segment: 0,
             position_mm: 0,
@@ -597,6 +610,8 @@ pub(crate) mod tests {
                 segment: 0,
                 position_mm: 0,
                 crystal: Crystal::Offset(0),
+                pace: Pace::Synch,
+                powered_at: Span::ZERO,
                 t_dp: Span::from_ms(8),
                 t_mapc: 1,
                 watchdog: Watchdog::of(Span::from_ms(200)),
@@ -612,6 +627,7 @@ pub(crate) mod tests {
                 ms1_timeout: Span::from_s(10),
                 services: MasterServices::default(),
             },
+            class1: Vec::new(),
             slaves: (3..3 + n).map(slave).collect(),
             class2: Vec::new(),
             links: Vec::new(),

@@ -27,6 +27,9 @@ pub struct Summary {
     pub timing: Timing,
     /// What happened how often.
     pub counts: Happened,
+    /// The token ring; none where the master was alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ring: Option<Ring>,
     /// Distributions of the network's quantities, by name.
     #[serde(serialize_with = "map")]
     pub distributions: Vec<(&'static str, Distribution)>,
@@ -161,6 +164,45 @@ pub struct Happened {
     pub events: u64,
     /// Largest latch skew \[steps\].
     pub skew_max_steps: Option<f64>,
+}
+
+/// The token ring as the master saw it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct Ring {
+    /// How often the token came round.
+    pub rotations: u64,
+    /// Shortest token rotation time T_RR.
+    #[serde(rename = "rotation_min_us", serialize_with = "us")]
+    pub min: Span,
+    /// Mean token rotation time.
+    #[serde(rename = "rotation_mean_us", serialize_with = "us")]
+    pub mean: Span,
+    /// Longest token rotation time.
+    #[serde(rename = "rotation_max_us", serialize_with = "us")]
+    pub max: Span,
+    /// SYNCHs that could not be sent when planned.
+    pub late_clocks: u64,
+    /// The latest of them.
+    #[serde(rename = "late_clock_max_us", serialize_with = "us")]
+    pub latest: Span,
+    /// SYNCHs that were left out because the token was away for a whole cycle.
+    pub missed_clocks: u64,
+}
+
+impl Ring {
+    fn of(counts: &Counts) -> Option<Self> {
+        let network = &counts.network;
+        let rotation = &network.rotation;
+        Some(Self {
+            rotations: rotation.count,
+            min: rotation.min,
+            mean: rotation.mean()?,
+            max: rotation.max,
+            late_clocks: network.late_clocks,
+            latest: network.latest_clock,
+            missed_clocks: network.missed_clocks,
+        })
+    }
 }
 
 /// What became of one slave.
@@ -383,6 +425,7 @@ impl Summary {
         Self {
             timing: timing(&facts, counts, histograms),
             counts: happened(counts),
+            ring: Ring::of(counts),
             distributions: distributions(histograms, Subject::Network),
             slaves: (0..facts.slaves.len()).map(|index| slave(index, &facts, counts, histograms)).collect(),
             links: layout.links().iter().map(link).collect(),

@@ -13,6 +13,7 @@
 //! within T_SL of a token that it got, since its sender listens so long.
 
 use super::{Application, Master, Part, STATUS_OCTETS};
+use crate::dp::handler::Handler;
 use crate::fdl::{Outbox, Timer};
 use crate::observation::Observation;
 use crate::time::{Local, Span};
@@ -81,7 +82,11 @@ impl<A: Application> Master<A> {
         self.clock.restart(now + self.settings.t_dp);
         self.polling = Polling::new();
         self.set_mode(crate::observation::MasterMode::Clear, out);
-        if self.is_free() { self.visit(now, out) } else { self.spare(now, out) }
+        match self.settings.pace {
+            Pace::Free { .. } => self.visit(now, out),
+            Pace::Synch if self.is_alone() => self.spare(now, out),
+            Pace::Synch => self.take(now, out),
+        }
     }
     /// A cycle begins at `now`. Returns its number and where it was aimed at.
     pub(super) fn started(&mut self, now: Local) -> (u64, Local) {
@@ -93,6 +98,7 @@ impl<A: Application> Master<A> {
                 (cycle, nominal)
             }
             Pace::Free { least } => {
+                self.active.not_before(now);
                 self.polling.next = now + least;
                 (cycle, now)
             }
@@ -124,6 +130,10 @@ impl<A: Application> Master<A> {
         if self.settings.active_spare && self.fits(t_tr) {
             return self.pass_on(out);
         }
+        self.take(now, out);
+    }
+    /// Holds a token that another station has passed: it listens for T_SL whether the token is taken.
+    fn take(&mut self, now: Local, out: &mut Outbox) {
         let answer = self.t_sl() - self.active.t_id1();
         if self.clock.planned() - now > answer { self.be_heard(now, out) } else { self.await_synch(now, out) }
     }
@@ -169,7 +179,8 @@ impl<A: Application> Master<A> {
     /// The token is here.
     pub(super) fn visit(&mut self, now: Local, out: &mut Outbox) {
         self.polling.visits += 1;
-        let at = self.active.free_at().max(now);
+        self.active.not_before(now);
+        let at = self.active.free_at();
         match self.polling.stopped_at.take() {
             Some(slave) => self.exchange(now, slave, out),
             None if at >= self.next_start() => {
@@ -182,10 +193,10 @@ impl<A: Application> Master<A> {
             }
         }
     }
-    /// The least cycle time is over, and Min_Slave_Interval of the first slave.
+    /// The least cycle time is over, and Min_Slave_Interval of every slave: none makes the master wait with the token.
     fn next_start(&self) -> Local {
-        let first = self.handlers.iter().find(|handler| handler.exchanges());
-        first.and_then(crate::dp::handler::Handler::earliest).map_or(self.polling.next, |at| at.max(self.polling.next))
+        let exchanging = self.handlers.iter().filter(|handler| handler.exchanges());
+        exchanging.filter_map(Handler::earliest).fold(self.polling.next, Local::max)
     }
     /// Whether T_TH is over before Data_Exchange with `slave`: then the token goes on, and later so does the cycle.
     pub(super) fn stops_before(&mut self, slave: usize, now: Local, out: &mut Outbox) -> bool {

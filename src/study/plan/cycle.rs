@@ -1,6 +1,7 @@
 //! Arithmetic of the bus cycle: every message cycle in it, its shares, and the spans that follow from it.
 
 use crate::device::profile::Profile;
+use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
 use crate::study::scenario::{Scenario, Slave};
 use crate::time::{BitRate, Span, Tbit};
@@ -58,7 +59,7 @@ pub struct Plan {
     pub gap: Span,
     /// One token: T_ID1 and its own length.
     pub token: Span,
-    /// SYNCH with the T_ID1 before it.
+    /// SYNCH with the T_ID1 before it; nothing without SYNCH.
     pub synch: Span,
 }
 
@@ -84,7 +85,9 @@ impl Plan {
     fn with(scenario: &Scenario, delays: impl Fn(&Slave) -> (Tbit, Span)) -> Self {
         let bus = &scenario.bus.params;
         let t_id1 = bus.span(bus.t_id1());
-        let mut start = bus.span(bus.t_id2());
+        // Without SYNCH a cycle begins with the first request.
+        let clocked = scenario.master.pace == Pace::Synch;
+        let mut start = if clocked { bus.span(bus.t_id2()) } else { Span::ZERO };
         let mut slots = Vec::with_capacity(scenario.slaves.len());
         for slave in scenario.configured() {
             let slot = slot(bus.rate, slave, start, delays(slave));
@@ -96,7 +99,7 @@ impl Plan {
             slots,
             gap: t_id1 + bus.span(STATUS_REQUEST + bus.t_sl),
             token: t_id1 + bus.span(TOKEN),
-            synch: t_id1 + bus.span(SYNCH),
+            synch: if clocked { t_id1 + bus.span(SYNCH) } else { Span::ZERO },
         }
     }
     /// T_DX as Set_Prm says it and slaves check it: in whole units of 1/12 us, rounded up.

@@ -12,6 +12,7 @@ pub(super) mod services;
 use super::Plan;
 use super::finding::{Amount, Finding, Key, Relation};
 use crate::device::profile::Profile;
+use crate::dp::master::Pace;
 use crate::sim::noise::GcJitter;
 use crate::study::scenario::kinds::jitter_bound;
 use crate::study::scenario::{Fault, Scenario, Slave};
@@ -39,12 +40,14 @@ pub struct Rule {
     pub weight: Weight,
     /// Keys that may be to blame instead, where the file does not have the key.
     pub instead: &'static [&'static str],
+    /// Whether it is about isochronous mode, and not asked of a master without SYNCH.
+    clocked: bool,
     judge: fn(&Facts<'_>, &mut Findings),
 }
 
 impl Rule {
     const fn must(text: &'static str, source: &'static str, judge: fn(&Facts<'_>, &mut Findings)) -> Self {
-        Self { text, source, weight: Weight::Must, instead: &[], judge }
+        Self { text, source, weight: Weight::Must, instead: &[], clocked: false, judge }
     }
     const fn advice(text: &'static str, source: &'static str, judge: fn(&Facts<'_>, &mut Findings)) -> Self {
         Self { weight: Weight::Advice, ..Self::must(text, source, judge) }
@@ -52,13 +55,18 @@ impl Rule {
     const fn warning(text: &'static str, source: &'static str, judge: fn(&Facts<'_>, &mut Findings)) -> Self {
         Self { weight: Weight::Warning, ..Self::must(text, source, judge) }
     }
+    const fn clocked(self) -> Self {
+        Self { clocked: true, ..self }
+    }
     const fn or(self, instead: &'static [&'static str]) -> Self {
         Self { instead, ..self }
     }
     /// What this rule finds in a network.
     pub fn findings(&'static self, facts: &Facts<'_>) -> Vec<Finding> {
         let mut found = Findings { rule: self, all: Vec::new() };
-        (self.judge)(facts, &mut found);
+        if !self.clocked || facts.scenario.master.pace == Pace::Synch {
+            (self.judge)(facts, &mut found);
+        }
         found.all
     }
 }
@@ -75,51 +83,54 @@ pub static BUS: &[Rule] = &[
 ];
 /// The bus cycle.
 pub static CYCLE: &[Rule] = &[
-    Rule::must("TDP_MIN <= T_DP <= TDP_MAX", "manual 3.3.2", cycle::t_dp_limits),
-    Rule::must("500 us <= T_DP <= 32 ms", "Set_Prm block 04", cycle::t_dp_system),
-    Rule::must("T_DP = n x T_BASE_DP", "manual 3.3.1, 3.3.2", cycle::t_dp_grid),
-    Rule::must("T_DP >= T_DX + GAP + token + SYNCH", "manual 3.3.2", cycle::t_dp_content),
-    Rule::must("T_DX < T_DP", "manual 3.3.2", cycle::t_dx_ends),
-    Rule::must("T_BASE_DP, T_BASE_IO are time bases", "Set_Prm block 04", cycle::time_bases),
+    Rule::must("TDP_MIN <= T_DP <= TDP_MAX", "manual 3.3.2", cycle::t_dp_limits).clocked(),
+    Rule::must("500 us <= T_DP <= 32 ms", "Set_Prm block 04", cycle::t_dp_system).clocked(),
+    Rule::must("T_DP = n x T_BASE_DP", "manual 3.3.1, 3.3.2", cycle::t_dp_grid).clocked(),
+    Rule::must("T_DP >= T_DX + GAP + token + SYNCH", "manual 3.3.2", cycle::t_dp_content).clocked(),
+    Rule::must("T_DX < T_DP", "manual 3.3.2", cycle::t_dx_ends).clocked(),
+    Rule::must("T_BASE_DP, T_BASE_IO are time bases", "Set_Prm block 04", cycle::time_bases).clocked(),
     Rule::must("1 <= T_MAPC <= 14 (T_DP)", "manual 3.3.3, octet 43", cycle::t_mapc),
     Rule::must("watchdog > T_DP", "Model: an exchange a cycle", cycle::watchdog_outlasts_t_dp).or(&["master.t_dp"]),
     Rule::must("watchdog = 10 ms x WD_Fact_1 x WD_Fact_2", "Set_Prm octets 2, 3", cycle::watchdog_factors),
 ];
 /// DP services in operation.
 pub static SERVICES: &[Rule] = &[
-    Rule::must("Min_Slave_Interval <= T_DP", "GSD, Min_Slave_Intervall", services::slave_interval).or(&["master.t_dp"]),
+    Rule::must("Min_Slave_Interval <= T_DP", "GSD, Min_Slave_Intervall", services::slave_interval)
+        .clocked()
+        .or(&["master.t_dp"]),
     Rule::must("Data_Control_Time >= 6 x T_DP", "Model: D5", services::data_control_time),
 ];
 /// T_I, T_O and the window of every slave.
 pub static INSTANTS: &[Rule] = &[
-    Rule::must("T_I = n x T_BASE_IO", "manual 3.3.4, 3.3.5", instants::t_i_grid),
-    Rule::must("T_O = n x T_BASE_IO", "manual 3.3.4, 3.3.6", instants::t_o_grid),
-    Rule::must("T_I >= TI_MIN", "manual 3.2.2, 3.3.5", instants::t_i_minimum),
-    Rule::must("T_O > T_DX + T_O_MIN", "manual 3.3.6, Model: D3", instants::t_o_minimum),
-    Rule::must("(T_DP - T_I) - T_O >= gap", "manual 3.3.5, 3.3.6, Model: D3", instants::t_o_maximum),
-    Rule::must("T_O < T_DP", "manual 3.3.6, Model: D3", instants::t_o_within),
-    Rule::must("T_I < T_DP", "manual 3.3.5", instants::t_i_within),
-    Rule::must("1/12 us <= T_PLL_W <= T_PLL_W_MAX", "manual 3.3.8", instants::window),
-    Rule::must("T_PLL_D + window < T_I", "manual 3.3.9, Model: D13", instants::delay),
-    Rule::must("narrowest window <= T_DP / 4", "Model: D12", instants::least_window),
+    Rule::must("T_I = n x T_BASE_IO", "manual 3.3.4, 3.3.5", instants::t_i_grid).clocked(),
+    Rule::must("T_O = n x T_BASE_IO", "manual 3.3.4, 3.3.6", instants::t_o_grid).clocked(),
+    Rule::must("T_I >= TI_MIN", "manual 3.2.2, 3.3.5", instants::t_i_minimum).clocked(),
+    Rule::must("T_O > T_DX + T_O_MIN", "manual 3.3.6, Model: D3", instants::t_o_minimum).clocked(),
+    Rule::must("(T_DP - T_I) - T_O >= gap", "manual 3.3.5, 3.3.6, Model: D3", instants::t_o_maximum).clocked(),
+    Rule::must("T_O < T_DP", "manual 3.3.6, Model: D3", instants::t_o_within).clocked(),
+    Rule::must("T_I < T_DP", "manual 3.3.5", instants::t_i_within).clocked(),
+    Rule::must("1/12 us <= T_PLL_W <= T_PLL_W_MAX", "manual 3.3.8", instants::window).clocked(),
+    Rule::must("T_PLL_D + window < T_I", "manual 3.3.9, Model: D13", instants::delay).clocked(),
+    Rule::must("narrowest window <= T_DP / 4", "Model: D12", instants::least_window).clocked(),
 ];
 /// The timers of every slave.
 pub static TIMERS: &[Rule] =
-    &[Rule::must("timer step <= window in force", "manual 3.3.8, Model: D14", instants::quantum)];
+    &[Rule::must("timer step <= window in force", "manual 3.3.8, Model: D14", instants::quantum).clocked()];
 /// The master's jitter.
-pub static JITTER: &[Rule] = &[Rule::must("jitter fits into the spare time", "Model: D1, D6", cycle::jitter_fits)];
+pub static JITTER: &[Rule] =
+    &[Rule::must("jitter fits into the spare time", "Model: D1, D6", cycle::jitter_fits).clocked()];
 /// The start-up of slaves.
 pub static START_UP: &[Rule] =
-    &[Rule::must("T_DP holds the start-up of a slave", "manual 3.3.2, Model: D6", cycle::start_up)];
+    &[Rule::must("T_DP holds the start-up of a slave", "manual 3.3.2, Model: D6", cycle::start_up).clocked()];
 /// What a network should keep.
 pub static ADVICE: &[Rule] = &[
-    Rule::warning("bit rate >= 1.5 Mbit/s", "SIMODRIVE 611 universal manual", advice::isochronous_rate),
-    Rule::advice("T_PLL_W >= the device's narrowest", "manual 3.3.8", advice::window_is_taken),
-    Rule::advice("T_PLL_W >= 2 x jitter of SYNCH", "Model: D1, D11", advice::jitter_within_window),
-    Rule::advice("revolutions x units = n x total range", "Model: D22", advice::seamless),
-    Rule::advice("T_DP holds a repeated Data_Exchange", "Model: D7", advice::repeats_fit),
-    Rule::advice("T_DP - T_DX >= 2 x T_BASE_IO of a drive", "SINAMICS A01902", advice::drive_cycles),
-    Rule::advice("T_DP >= T_I + T_O + T_BASE_IO of a drive", "SINAMICS A01902", advice::drive_instants),
+    Rule::warning("bit rate >= 1.5 Mbit/s", "SIMODRIVE 611 universal manual", advice::isochronous_rate).clocked(),
+    Rule::advice("T_PLL_W >= the device's narrowest", "manual 3.3.8", advice::window_is_taken).clocked(),
+    Rule::advice("T_PLL_W >= 2 x jitter of SYNCH", "Model: D1, D11", advice::jitter_within_window).clocked(),
+    Rule::advice("revolutions x units = n x total range", "Model: D22", advice::seamless).clocked(),
+    Rule::advice("T_DP holds a repeated Data_Exchange", "Model: D7", advice::repeats_fit).clocked(),
+    Rule::advice("T_DP - T_DX >= 2 x T_BASE_IO of a drive", "SINAMICS A01902", advice::drive_cycles).clocked(),
+    Rule::advice("T_DP >= T_I + T_O + T_BASE_IO of a drive", "SINAMICS A01902", advice::drive_instants).clocked(),
 ];
 
 /// Every rule.

@@ -1,6 +1,7 @@
 //! The rules between the keys of a scenario, each with its source, the numbers, and the nearest right value. Those of
 //! the bus and of its times are the planner's, see [`crate::study::plan::rules`]; the others are a function each here.
 
+use super::class1;
 use super::class2;
 use super::error::{Fault, Problem};
 use super::gsd;
@@ -44,7 +45,7 @@ impl Stage {
 
 /// All rules in stages. A stage takes for granted that the stages before found nothing.
 static STAGES: &[Stage] = &[
-    Stage::own(&[some_slave, own_addresses, addresses_within_hsa, wiring, crystals, run_length]),
+    Stage::own(&[some_slave, own_addresses, class1::owners, addresses_within_hsa, wiring, crystals, run_length]),
     Stage::own(&[class2::slaves]),
     Stage { own: &[gsd::device_rates], planned: &[rules::BUS] },
     Stage { own: &[], planned: &[rules::CYCLE] },
@@ -56,7 +57,8 @@ static STAGES: &[Stage] = &[
     Stage::own(&[publishers, subscribers, samples, link_counts, link_watchdog]),
     Stage::own(&[sample_lengths, destinations, told_lengths]),
     Stage::own(&[gsd::set_prm_length]),
-    Stage::own(&[event_stations, gsd::acyclic_devices, event_instants, disturbance_stations, services::commands]),
+    Stage::own(&[event_stations, class1::event_stations, gsd::acyclic_devices, event_instants]),
+    Stage::own(&[disturbance_stations, services::commands]),
     Stage { own: &[], planned: &[rules::START_UP] },
 ];
 
@@ -176,7 +178,7 @@ fn run_length(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 /// Octet 15 and scaling belong to the encoders' parameter block, which a subscriber does not have.
 fn encoder_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured().filter(|slave| slave.device.subscriber) {
+    for slave in facts.scenario.answering().filter(|slave| slave.device.subscriber) {
         let given = [
             ("scaling", slave.scaling.is_some()),
             ("functions", slave.functions),
@@ -194,7 +196,7 @@ fn encoder_parameters(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 /// The positions of a disc fit into the words of telegram 81.
 fn resolution(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         let Resolution { steps_per_rev, revolutions } = slave.resolution();
         if let Err(error) = motion::Resolution::new(steps_per_rev, revolutions) {
             let fault = Fault::new(error.to_string()).rule("G1_XIST1 and G1_XIST2 have 32 bits (manual 2.2)");
@@ -204,7 +206,7 @@ fn resolution(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn functions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         if slave.scaling.is_some() && !slave.functions {
             let fault = Fault::new(format!("slave {} has scaling, but functions = false", slave.address))
                 .rule("scaling needs octet 15 bit 1 as well as bit 3 (manual 3.2.2, Model: D21)")
@@ -215,7 +217,7 @@ fn functions(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn code_sequence(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         if slave.code_sequence == CodeSequence::Ccw && !slave.functions {
             let fault = Fault::new(format!("code_sequence = \"ccw\" has no effect in slave {}", slave.address))
                 .rule("the code sequence is in force with octet 15 bit 1 alone (manual 3.2.2)")
@@ -226,7 +228,7 @@ fn code_sequence(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn units_per_rev(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         let (Some(scaling), steps) = (slave.scaling, slave.resolution().steps_per_rev) else { continue };
         if !(1..=steps).contains(&scaling.units_per_rev) {
             let fault = Fault::new(format!("{} units per revolution are out of range", scaling.units_per_rev))
@@ -238,7 +240,7 @@ fn units_per_rev(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn total_range(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         let Some(scaling) = slave.scaling else { continue };
         let revolutions = slave.resolution().revolutions;
         let max = u64::from(scaling.units_per_rev) * u64::from(revolutions);
@@ -313,7 +315,7 @@ fn subscribers(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 /// The slave at `address`, if the master has it in its list.
 fn configured<'a>(facts: &Facts<'a>, address: Address) -> Option<&'a Slave> {
-    facts.scenario.slave(address).filter(|slave| !slave.silent)
+    facts.scenario.slave(address).filter(|slave| !slave.silent && slave.master == facts.scenario.master.address)
 }
 
 /// The fault of naming a slave that is not there, or silent.
@@ -458,7 +460,9 @@ fn link_watchdog(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 }
 
 fn event_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for (i, event) in facts.scenario.events.iter().enumerate() {
+    let events = facts.scenario.events.iter().enumerate();
+    let orders = events.filter(|(_, event)| !matches!(event.action, Action::PowerOff | Action::PowerOn));
+    for (i, event) in orders {
         if let Some(&address) = event.slaves.iter().find(|&&address| facts.scenario.slave(address).is_none()) {
             let path = format!("event.{}", i + 1);
             about(reader, &format!("{path}.slave"), &[&format!("{path}.slaves")], no_slave(facts, address));
@@ -489,6 +493,7 @@ fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
         for (key, station) in [("from", from), ("to", to)] {
             if let Some(address) = *station
                 && address != facts.scenario.master.address
+                && facts.scenario.class1(address).is_none()
                 && facts.scenario.slave(address).is_none()
             {
                 let fault = no_slave(facts, address);

@@ -199,7 +199,7 @@ impl Chosen {
 /// Every slave works at the bit rate.
 pub(super) fn device_rates(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let rate = facts.scenario.bus.params.rate;
-    for slave in facts.scenario.configured().filter(|slave| !slave.device.works_at(rate)) {
+    for slave in facts.scenario.answering().filter(|slave| !slave.device.works_at(rate)) {
         let all = BitRate::ALL.iter().filter(|&&rate| slave.device.works_at(rate));
         let fault = Fault::new(format!("slave {} does not work at {rate}", slave.address))
             .rule(format!("bit rates of {} (its profile or GSD file)", slave.device.name))
@@ -210,7 +210,7 @@ pub(super) fn device_rates(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 /// Blocks and links fit into what the device takes.
 pub(super) fn set_prm_length(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         let octets = build::set_prm(facts.scenario, slave).len() - 7;
         if octets > slave.device.max_prm.into() {
             let fault = Fault::new(format!("slave {} would get {octets} octets of user parameters", slave.address))

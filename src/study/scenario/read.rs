@@ -1,6 +1,7 @@
 //! The tree of a scenario becomes a [`Scenario`], table by table and key by key.
 
 use super::acyclic;
+use super::class1;
 use super::class2;
 use super::error::Fault;
 use super::gsd;
@@ -12,20 +13,34 @@ use super::services;
 use super::topology::{self, cable, spread, station_segment};
 use super::tree::{Node, Place, Table, Value};
 use super::{
-    Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Master, Record, Run, Scaling, Scenario,
-    Slave, Topology, Watchdog, When,
+    Action, Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Master, Record, Run, Scaling,
+    Scenario, Slave, Topology, Watchdog, When,
 };
 use crate::device::profile::Profile;
+use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
 use crate::sim::motion::{Angle, Motion};
 use crate::sim::noise::GcJitter;
+use crate::study::plan::Plan;
 use crate::study::quantity::{bit_rate, ppb, tbit};
 use crate::time::{BitRate, Span, Tbit};
 use crate::wire::Address;
 
 /// The tables of a file; the second half is lists, `[[slave]]`.
-const TABLES: [&str; 11] =
-    ["run", "bus", "master", "record", "segment", "repeater", "slave", "class2", "link", "event", "disturbance"];
+const TABLES: [&str; 12] = [
+    "run",
+    "bus",
+    "master",
+    "record",
+    "segment",
+    "repeater",
+    "slave",
+    "class1",
+    "class2",
+    "link",
+    "event",
+    "disturbance",
+];
 /// How many of [`TABLES`] are single tables.
 const SINGLE: usize = 4;
 
@@ -54,30 +69,42 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
     let mut slaves = Vec::with_capacity(slave_tables.len());
     for (index, table) in slave_tables.iter().enumerate() {
         let position_mm = positions.get(index).copied().unwrap_or(0);
-        let context = Context { bus: bus.as_ref(), topology: topology.as_ref(), times: times.as_ref(), position_mm };
+        let context = Context {
+            bus: bus.as_ref(),
+            master: master.as_ref(),
+            topology: topology.as_ref(),
+            times: times.as_ref(),
+            position_mm,
+        };
         slaves.extend(slave(reader, table, &context));
     }
     let addresses: Vec<_> = slave_tables.iter().map(|table| table.address).collect();
+    let class1 = list(reader, &root, "class1", |section, reader| class1::read(section, reader, topology.as_ref()));
     let class2 =
         list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses, topology.as_ref()));
     let links = list(reader, &root, "link", link);
     let events = list(reader, &root, "event", |section, reader| event(section, reader, &addresses));
     let disturbances = list(reader, &root, "disturbance", disturbance);
     let record = record(Section::of_file(reader, &root, "record"), reader);
-    Some(Scenario {
+    let mut scenario = Scenario {
         name: String::new(),
         question: String::new(),
         run: run?,
         bus: bus?,
         topology: topology?,
         master: master?,
+        class1,
         slaves,
         class2,
         links,
         events,
         disturbances,
         record,
-    })
+    };
+    if let Pace::Free { least } = scenario.master.pace {
+        scenario.master.t_dp = Plan::of(&scenario).content().max(least);
+    }
+    Some(scenario)
 }
 
 /// Complains about tables that nothing is known of.
@@ -298,6 +325,8 @@ fn bus(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Bus> {
     for (key, value) in numbers {
         *value = section.optional(reader, key, number(0..=u8::MAX)).unwrap_or(*value);
     }
+    let t_tr = section.optional(reader, "t_tr", quantity("100000 tbit", tbit));
+    params.t_tr = t_tr.unwrap_or_else(|| BusParams::usual_t_tr(params.hsa.max(1)));
     let cable_mm = section.optional(reader, "cable", cable).unwrap_or(0);
     section.finish(reader);
     rate.map(|_| Bus { params, cable_mm })
@@ -312,7 +341,13 @@ fn master(
 ) -> Option<(Master, Times)> {
     let s = &mut section;
     let address = s.required(reader, "address", "2", address);
-    let t_dp = s.required(reader, "t_dp", "\"2 ms\"", cycle_time(rate));
+    let pace = class1::pace(s, reader);
+    let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
+    let t_dp = match pace {
+        Pace::Synch => s.required(reader, "t_dp", "\"2 ms\"", cycle_time(rate)),
+        // The planned cycle, once the slaves are known.
+        Pace::Free { .. } => s.optional(reader, "t_dp", cycle_time(rate)).or(Some(Span::ZERO)),
+    };
     let t_mapc = s.optional(reader, "t_mapc", number(0..=u8::MAX)).unwrap_or(1);
     let times = Times::read(reader, s, rate);
     let watchdog = s.optional(reader, "watchdog", watchdog).unwrap_or(Some(Watchdog { factor_1: 20, factor_2: 1 }));
@@ -338,6 +373,8 @@ fn master(
         segment,
         position_mm,
         crystal,
+        pace,
+        powered_at,
         t_dp,
         t_mapc,
         watchdog,
@@ -385,7 +422,7 @@ impl Times {
 }
 
 /// A watchdog; `"0 ms"` is none.
-fn watchdog(node: &Node) -> Result<Option<Watchdog>, Fault> {
+pub(super) fn watchdog(node: &Node) -> Result<Option<Watchdog>, Fault> {
     let wanted = instant(node)?;
     if wanted == Span::ZERO {
         return Ok(None);
@@ -422,6 +459,7 @@ pub(super) fn crystal(reader: &mut Reader<'_>, section: &mut Section<'_>) -> Cry
 /// What a slave inherits.
 struct Context<'a> {
     bus: Option<&'a Bus>,
+    master: Option<&'a Master>,
     topology: Option<&'a Topology>,
     times: Option<&'a Times>,
     position_mm: u64,
@@ -438,6 +476,11 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let crystal = crystal(reader, s);
     let t_sdr = s.optional(reader, "t_sdr", quantity("30 tbit", tbit));
     let own = Times::read(reader, s, rate);
+    let master = s.optional(reader, "master", address).or(context.master.map(|master| master.address));
+    let clocked = context.master.is_none_or(|own| own.pace == Pace::Synch && master == Some(own.address));
+    if !clocked {
+        class1::refuse_times(s, reader);
+    }
     let standstill = Motion::Standstill { at: Angle::ZERO };
     let motion = match s.table(reader, "motion") {
         Some(inner) => kinds::motion(inner, reader)?,
@@ -455,11 +498,16 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let user_prm = gsd::user_prm(kind.as_ref(), s, reader);
     let services = services::slave(s, reader);
     section.finish(reader);
-    let times = iso_times(reader, from, own.or(context.times), context.times.is_some());
+    let times = if clocked {
+        iso_times(reader, from, own.or(context.times), context.times.is_some())
+    } else {
+        Some(class1::UNCLOCKED)
+    };
     let (device, bus) = (kind?.device, context.bus?);
     let t_sdr = t_sdr.unwrap_or_else(|| default_t_sdr(bus, &device));
     let mut slave = Slave {
         address: from.address,
+        master: master?,
         device,
         segment,
         position_mm,
@@ -535,7 +583,14 @@ fn event(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> 
         s.complain(reader, fault.help("for example: at = \"1 s\", or cycle = 500"));
     }
     let action = Kind::read(ACTIONS, "action", "do", s, reader)?;
-    let slaves = if action.about_slaves() { Some(targets("event", reader, s, all)) } else { None };
+    let power = matches!(action, Action::PowerOff | Action::PowerOn);
+    let slaves = if power && s.has("station") {
+        s.optional(reader, "station", address).map(|station| vec![station])
+    } else if action.about_slaves() {
+        Some(targets("event", reader, s, all))
+    } else {
+        None
+    };
     section.finish(reader);
     let when = at.map(When::Time).or(cycle.map(When::Cycle))?;
     Some(Event { when, slaves: slaves.unwrap_or_default(), action })

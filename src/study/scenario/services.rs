@@ -76,7 +76,7 @@ fn groups(node: &Node) -> Result<u8, Fault> {
 
 /// A slave is not asked for what it cannot do.
 pub(super) fn sync_and_freeze(facts: &Facts<'_>, reader: &mut Reader<'_>) {
-    for slave in facts.scenario.configured() {
+    for slave in facts.scenario.answering() {
         let SlaveServices { sync, freeze, .. } = slave.services;
         for (key, wanted, has) in [("sync", sync, slave.device.sync), ("freeze", freeze, slave.device.freeze)] {
             if wanted && !has {

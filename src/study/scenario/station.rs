@@ -10,6 +10,8 @@ enum Kind {
     Master,
     Slave,
     /// By its number in the file, from 1.
+    Class1(usize),
+    /// By its number in the file, from 1.
     Class2(usize),
 }
 
@@ -33,14 +35,16 @@ impl Station<'_> {
         match self.kind {
             Kind::Master => "the master",
             Kind::Slave => "a slave",
+            Kind::Class1(_) => "a class 1 master",
             Kind::Class2(_) => "a class 2 master",
         }
     }
-    /// Its table in the scenario: `master`, `slave.3` by address, `class2.1` by number.
+    /// Its table in the scenario: `master`, `slave.3` by address, `class1.1` and `class2.1` by number.
     pub fn path(&self) -> String {
         match self.kind {
             Kind::Master => "master".to_owned(),
             Kind::Slave => format!("slave.{}", self.address),
+            Kind::Class1(number) => format!("class1.{number}"),
             Kind::Class2(number) => format!("class2.{number}"),
         }
     }
@@ -65,6 +69,13 @@ impl Scenario {
             what: &slave.device.name,
             kind: Kind::Slave,
         });
+        let class1 = self.class1.iter().zip(1..).map(move |(class1, number)| Station {
+            address: class1.address,
+            point: point(class1.segment, class1.position_mm),
+            crystal: class1.crystal,
+            what: "class 1 master",
+            kind: Kind::Class1(number),
+        });
         let class2 = self.class2.iter().zip(1..).map(move |(class2, number)| Station {
             address: class2.address,
             point: point(class2.segment, class2.position_mm),
@@ -72,6 +83,6 @@ impl Scenario {
             what: "class 2 master",
             kind: Kind::Class2(number),
         });
-        [master].into_iter().chain(slaves).chain(class2)
+        [master].into_iter().chain(slaves).chain(class1).chain(class2)
     }
 }

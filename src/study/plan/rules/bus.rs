@@ -38,7 +38,7 @@ pub(super) fn parameters(facts: &Facts<'_>, found: &mut Findings) {
 /// Reading a scenario has refused higher addresses before.
 pub(super) fn addresses(facts: &Facts<'_>, found: &mut Findings) {
     let scenario = facts.scenario;
-    let highest = scenario.slaves.iter().map(|slave| slave.address).chain([scenario.master.address]).max();
+    let highest = scenario.stations().map(|station| station.address).max();
     if let Some(highest) = highest {
         let (hsa, highest) = (u32::from(scenario.bus.params.hsa), u32::from(highest.get()));
         found.silent(Key::bus("hsa"), hsa, Relation::AtLeast, ("highest address", highest));
@@ -47,7 +47,7 @@ pub(super) fn addresses(facts: &Facts<'_>, found: &mut Findings) {
 
 pub(super) fn device_max_tsdr(facts: &Facts<'_>, found: &mut Findings) {
     let params = &facts.scenario.bus.params;
-    let slowest = facts.slaves().max_by_key(|slave| slave.device.max_tsdr(params.rate));
+    let slowest = facts.scenario.answering().max_by_key(|slave| slave.device.max_tsdr(params.rate));
     let Some(slave) = slowest else { return };
     let needed = slave.device.max_tsdr(params.rate);
     let terms = format!("MaxTsdr of {}", slave.device.name);
@@ -60,7 +60,7 @@ pub(super) fn device_max_tsdr(facts: &Facts<'_>, found: &mut Findings) {
 
 pub(super) fn own_t_sdr(facts: &Facts<'_>, found: &mut Findings) {
     let params = &facts.scenario.bus.params;
-    for slave in facts.slaves() {
+    for slave in facts.scenario.answering() {
         let min = params.min_tsdr;
         let max = slave.device.max_tsdr(params.rate).max(min);
         let fault = || {
