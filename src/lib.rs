@@ -102,7 +102,7 @@
 //!     0, 0, 0x05, 0xDC, 0, 1, 0, 8, 0, 0, 0x15, 0x0C, 0, 12, 0, 0, // T_I 125 us, T_O 1 ms, T_DX, T_PLL_W 1 us
 //! ];
 //! assert_eq!(ask(Some((Sap::SET_PRM, Sap::MASTER_MS0)), &prm), [0xE5]);
-//! assert_eq!(ask(Some((Sap::CHK_CFG, Sap::MASTER_MS0)), profile.config), [0xE5]);
+//! assert_eq!(ask(Some((Sap::CHK_CFG, Sap::MASTER_MS0)), &profile.config), [0xE5]);
 //!
 //! // Data_Exchange: STW2 = 0, G1_STW = 2000; ZSW2 = 0, G1_ZSW = 2000, G1_XIST1 left-justified, G1_XIST2.
 //! let inputs = &ask(None, &[0x00, 0x00, 0x20, 0x00])[7..19];

@@ -1,7 +1,7 @@
 //! The command line `isodp`.
 
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -9,11 +9,16 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isodp::sim::network::NetworkEvent;
 use isodp::sim::queue::NearQueue;
+use isodp::study::gsd::Gsd;
+use isodp::study::plan::command::{Call, answer};
+use isodp::study::plan::rules::warnings;
 use isodp::study::run::{Outcome, Progress, run};
 use isodp::study::scenario::{Extent, Scenario};
 use isodp::study::{devices, report};
 use isodp::time::Span;
 
+/// A planned network breaks a rule.
+const VIOLATED: u8 = 1;
 /// A wrong call, scenario or file.
 const USAGE: u8 = 2;
 
@@ -23,12 +28,16 @@ Examples:
       The main job: a complete network, its figures on screen, files under out/reference/.
   isodp run scenarios/reference.toml --seed 7 --out /tmp/results
       The same with other draws, files under /tmp/results/reference/.
+  isodp plan scenarios/reference.toml
+      What its bus cycle will be and whether its times keep the rules; --propose shows times that do.
   isodp devices posital-ocd-dpb1b
       What the profile of this device says; without a name, all devices.
+  isodp gsd scenarios/gsd/isodp_posital_06df.gsd
+      What a GSD file says; scenarios use it with device = { gsd = FILE }.
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
 
-Exit codes: 0 done, 2 wrong usage, scenario or file.";
+Exit codes: 0 done, 1 a planned rule is violated, 2 wrong usage, scenario or file.";
 
 /// Simulates isochronous PROFIBUS DP (DP-V2) networks, telegram by telegram, in deterministic time.
 #[derive(Parser)]
@@ -43,8 +52,13 @@ enum Command {
     /// Runs a scenario and leaves figures, tables, histograms and plots.
     #[command(after_help = EXAMPLES)]
     Run(RunArgs),
-    /// Lists the devices that a scenario can name, or tells everything about one.
+    /// Reckons what a scenario's bus cycle will be, and which rules its times keep, without simulating it.
+    #[command(after_help = EXAMPLES)]
+    Plan(PlanArgs),
+    /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
+    /// Shows what a GSD file says, what of it is ignored and what does not fit.
+    Gsd(GsdArgs),
 }
 
 #[derive(Args)]
@@ -52,6 +66,32 @@ struct DevicesArgs {
     /// The device to tell about.
     #[arg(value_name = "NAME")]
     name: Option<String>,
+}
+
+#[derive(Args)]
+struct GsdArgs {
+    /// GSD file of a PROFIBUS DP slave, in any language (.gsd, .gse, .gsg ...).
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+}
+
+#[derive(Args)]
+struct PlanArgs {
+    /// Scenario file (TOML); its times may break rules.
+    #[arg(value_name = "FILE")]
+    scenario: PathBuf,
+    /// Directory for plan.json, plan.svg and telegrams.txt; they go to DIR/<scenario>/.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    sets: Vec<(String, String)>,
+    /// Shows, as a scenario, times that keep all rules with the shortest T_DP, and nothing else.
+    #[arg(long, conflicts_with = "slave")]
+    propose: bool,
+    /// Shows Set_Prm and Chk_Cfg of this slave octet by octet, and nothing else.
+    #[arg(long, value_name = "N")]
+    slave: Option<u8>,
 }
 
 #[derive(Args)]
@@ -83,17 +123,24 @@ fn seed(text: &str) -> Result<u64, String> {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Run(args) => run_command(args),
-        Command::Devices(args) => devices_command(args.name.as_deref()),
+        Command::Run(args) => run_command(args).map(done),
+        Command::Plan(args) => plan_command(args),
+        Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
+        Command::Gsd(args) => gsd_command(&args.file).map(done),
     };
-    match result.and_then(|page| show(&page)) {
-        Ok(()) => ExitCode::SUCCESS,
+    match result.and_then(|(page, code)| show(&page).map(|()| code)) {
+        Ok(code) => code,
         Err(error) => {
             // Where standard error is gone too, the exit code is all that can be told.
             let _ = writeln!(anstream::stderr(), "error: {error}");
             ExitCode::from(USAGE)
         }
     }
+}
+
+/// A page of a command that did what it should.
+fn done(page: String) -> (String, ExitCode) {
+    (page, ExitCode::SUCCESS)
 }
 
 /// Prints `page`. A reader that has seen enough and closes its end is fine.
@@ -111,14 +158,29 @@ fn run_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
     let mut sets = args.sets;
     sets.extend(args.seed.map(|seed| ("run.seed".to_owned(), seed.to_string())));
     let scenario = Scenario::load(&args.scenario, &sets)?;
+    for warning in warnings(&scenario) {
+        // Where standard error is gone, the summary tells.
+        let _ = writeln!(anstream::stderr(), "warning: {warning}");
+    }
     let bar = Bar::new(&scenario);
     let Outcome { summary, dir, .. } = run::<NearQueue<NetworkEvent>>(&scenario, Some(&args.out), |at| bar.show(at))?;
     bar.line.finish_and_clear();
     Ok(report::render(&summary, dir.as_ref().map(|dir| dir.display().to_string()).as_deref()))
 }
 
+fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
+    let PlanArgs { scenario: file, out, sets, propose, slave } = args;
+    let answer = answer(&Call { file, sets, propose, slave, out })?;
+    let code = if answer.violated { ExitCode::from(VIOLATED) } else { ExitCode::SUCCESS };
+    Ok((answer.page, code))
+}
+
 fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
     Ok(name.map_or_else(|| Ok(devices::list()), devices::full)?)
+}
+
+fn gsd_command(file: &Path) -> Result<String, Box<dyn std::error::Error>> {
+    Ok(Gsd::load(file)?.to_string())
 }
 
 /// The progress bar; nothing where standard error is no terminal.

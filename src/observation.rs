@@ -7,9 +7,9 @@
 use core::fmt;
 
 use crate::time::{Local, Span};
-use crate::wire::Address;
-use crate::wire::acyclic::ErrorCode;
+use crate::wire::acyclic::{AbortCode, ErrorCode};
 use crate::wire::parameter::{self, ErrorNumber};
+use crate::wire::{Address, Sap};
 
 macro_rules! named {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $text:literal,)* }) => {
@@ -162,7 +162,7 @@ named! {
 named! {
     /// State of a slave-to-slave link in the subscriber (Model: D27).
     LinkState {
-        /// Nothing valid came yet, or not for the watchdog time.
+        /// Nothing came yet, or not for the watchdog time.
         Lost = "lost",
         /// Valid data came within the watchdog time.
         Active = "active",
@@ -186,6 +186,17 @@ named! {
     }
 }
 named! {
+    /// Why an active station left the ring, or lost the token that it held.
+    RingExit {
+        /// The token passed it over twice.
+        Skipped = "passed over twice",
+        /// Another station uses its address.
+        AddressConflict = "another station has its address",
+        /// It heard another station use a token while it held one itself.
+        SecondToken = "a second token",
+    }
+}
+named! {
     /// What the two LEDs in the connection cap show, red/green (manual 5.2).
     Leds {
         /// No supply.
@@ -203,6 +214,97 @@ named! {
     }
 }
 
+named! {
+    /// State of an MS2 connection, on either side.
+    ConnectionState {
+        /// There is none.
+        Closed = "closed",
+        /// Asked for, not confirmed yet.
+        Opening = "opening",
+        /// Nothing is asked.
+        Open = "open",
+        /// A request waits for its answer.
+        Working = "working",
+        /// Given up, the other side does not know yet.
+        Aborting = "aborting",
+    }
+}
+
+named! {
+    /// Which kind of master asks for an acyclic service.
+    MasterClass {
+        /// It parameterises its slaves and exchanges data with them.
+        One = "class 1",
+        /// A tool for commissioning and service.
+        Two = "class 2",
+    }
+}
+named! {
+    /// What a class 2 master reads or writes.
+    AcyclicService {
+        /// The diagnosis.
+        Diagnosis = "Slave_Diag",
+        /// The inputs of a slave.
+        Inputs = "RD_Inp",
+        /// The outputs of a slave.
+        Outputs = "RD_Outp",
+        /// The configuration.
+        Configuration = "Get_Cfg",
+        /// A record over MS2.
+        RecordRead = "Read",
+        /// A record over MS2.
+        RecordWrite = "Write",
+    }
+}
+named! {
+    /// How an acyclic service ended.
+    AcyclicResult {
+        /// The slave did it.
+        Positive = "positive",
+        /// The slave answered that it does not.
+        Negative = "negative",
+        /// Nothing that ends it came in time.
+        Timeout = "time-out",
+        /// Its connection was refused, aborted or closed.
+        Broken = "connection lost",
+    }
+}
+
+/// Why the state of an MS2 connection changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ConnectionCause {
+    /// The master asked for it.
+    Initiated,
+    /// The slave confirmed it.
+    Confirmed,
+    /// No connection is free, or the slave has closed it.
+    Refused,
+    /// This side gives it up.
+    GaveUp(AbortCode),
+    /// The other side aborted it: octet 3 of the abort, instance and code.
+    Aborted(u8),
+    /// The other side knows of the abort.
+    Told,
+    /// The other side does not ask any more.
+    Silence,
+}
+impl fmt::Display for ConnectionCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Initiated => f.write_str("Initiate"),
+            Self::Confirmed => f.write_str("confirmed"),
+            Self::Refused => f.write_str("refused, SAP closed"),
+            Self::GaveUp(code) => write!(f, "given up, {code}"),
+            Self::Aborted(reason) => match AbortCode::from_code(reason & 0x0F) {
+                Some(code) => write!(f, "aborted by the other side, {code}"),
+                None => write!(f, "aborted by the other side, reason {reason:02X}"),
+            },
+            Self::Told => f.write_str("abort told"),
+            Self::Silence => f.write_str("nothing heard"),
+        }
+    }
+}
+
 /// Why an acyclic request failed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum AcyclicFailure {
@@ -212,6 +314,8 @@ pub enum AcyclicFailure {
     Timeout,
     /// The slave left data exchange.
     Left,
+    /// The connection was aborted, by either side: octet 3 of the abort, instance and code.
+    Aborted(u8),
     /// The slave refused it, with this class and code (DP-V1).
     Refused(ErrorCode),
     /// The answer cannot be read.
@@ -223,6 +327,10 @@ impl fmt::Display for AcyclicFailure {
             Self::Closed => f.write_str("its service access point is closed"),
             Self::Timeout => f.write_str("no answer in time"),
             Self::Left => f.write_str("it left data exchange"),
+            Self::Aborted(reason) => match AbortCode::from_code(reason & 0x0F) {
+                Some(code) => write!(f, "the connection was aborted, {code}"),
+                None => write!(f, "the connection was aborted, reason {reason:02X}"),
+            },
             Self::Refused(code) => write!(f, "refused: {code}"),
             Self::Unreadable => f.write_str("its answer cannot be read"),
         }
@@ -259,6 +367,11 @@ pub enum Observation {
         /// How late its sending begins.
         by: Span,
     },
+    /// The token came back so late that whole cycles are left out.
+    SynchMissed {
+        /// How many SYNCH never left.
+        cycles: u64,
+    },
     /// The master's operation mode changed.
     MasterMode {
         /// Before.
@@ -290,12 +403,47 @@ pub enum Observation {
         /// From whom.
         slave: Address,
     },
+    /// A slave left data exchange against the master's will: it refused (RS), answered nonsense, was silent for too long,
+    /// or said so in its diagnosis. `Handler` tells that the master starts over, also where it does so of its own accord.
+    Lost {
+        /// Which.
+        slave: Address,
+    },
+    /// A slave's diagnosis was read. What it says is told by `Diagnosis`, if that is new.
+    DiagnosisRead {
+        /// Whose.
+        slave: Address,
+    },
     /// A slave's diagnosis as the master read it.
     Diagnosis {
         /// Whose.
         slave: Address,
         /// Octets 1 to 3.
         status: [u8; 3],
+    },
+    /// A slave's diagnosis has extended blocks, or others than before.
+    ExtendedDiagnosis {
+        /// Whose.
+        slave: Address,
+        /// All their octets.
+        length: u8,
+        /// The first of them, zero where there are fewer.
+        first: [u8; 8],
+    },
+    /// A slave replied with high priority (DH): its diagnosis is read in the next cycle.
+    DiagnosisDue {
+        /// Which.
+        slave: Address,
+    },
+    /// The master sends the slaves a command that is no mode.
+    Control {
+        /// Octets 1 and 2 of Global_Control.
+        octets: [u8; 2],
+    },
+    /// The master goes back to Clear: a slave was without Data_Exchange for Data_Control_Time (Error_Action_Flag).
+    AutoClear {
+        /// Which.
+        slave: Address,
     },
     /// A GAP poll and what it found.
     Gap {
@@ -306,6 +454,42 @@ pub enum Observation {
     },
     /// The token was claimed after T_TO of silence.
     TokenClaimed,
+    /// The token came from another active station.
+    TokenReceived {
+        /// T_RR, real rotation time: since the token came last; zero the first time.
+        t_rr: Span,
+        /// T_TH, what may be used of it; not positive where the token came late.
+        t_th: Span,
+    },
+    /// The token was sent again: nothing was heard of the station it went to.
+    TokenRetry {
+        /// To whom.
+        to: Address,
+    },
+    /// The token was given up while it was held.
+    TokenDropped {
+        /// Why.
+        why: RingExit,
+    },
+    /// This station got its first token: it is in the ring.
+    RingEntered,
+    /// This station left the ring and listens.
+    RingLeft {
+        /// Why.
+        why: RingExit,
+    },
+    /// Another station has this station's address: it keeps away from the line.
+    AddressConflict,
+    /// A GAP poll found an active station that is ready: it is next in the ring.
+    StationJoined {
+        /// Which one.
+        station: Address,
+    },
+    /// An active station did not take the token and is no longer in the ring.
+    StationLost {
+        /// Which one.
+        station: Address,
+    },
     /// The master application's check of one slave's sign of life changed its state (Model: D17).
     SlaveLife {
         /// Whose.
@@ -368,6 +552,44 @@ pub enum Observation {
         why: AcyclicFailure,
     },
 
+    /// What a class 2 master has read from a slave or written to it, but for parameters.
+    AcyclicData {
+        /// The slave.
+        slave: Address,
+        /// By which service.
+        service: AcyclicService,
+        /// Slot and index of a record.
+        record: Option<(u8, u8)>,
+        /// Octets of the data.
+        len: u8,
+        /// The first of them, zero where there are none.
+        head: [u8; 8],
+    },
+    /// An acyclic service is over: a PDU and its answer, or the repeated polls for it, or one read of DP-V0.
+    AcyclicDone {
+        /// Of whom it was asked.
+        slave: Address,
+        /// By which kind of master.
+        class: MasterClass,
+        /// How it ended.
+        result: AcyclicResult,
+        /// From its beginning at the master to here.
+        took: Span,
+    },
+    /// An MS2 connection was opened or closed, seen by the slave or by the class 2 master. Its requests are not told.
+    Connection {
+        /// The other side.
+        peer: Address,
+        /// The slave's SAP; 49 before the resource manager has named another.
+        sap: Sap,
+        /// Before.
+        from: ConnectionState,
+        /// Now.
+        to: ConnectionState,
+        /// Why.
+        why: ConnectionCause,
+    },
+
     // ----- slave
     /// A slave's DP state changed.
     SlaveState {
@@ -377,6 +599,13 @@ pub enum Observation {
         to: SlaveState,
         /// Why.
         cause: SlaveCause,
+    },
+    /// Sync or Freeze mode of a slave changed.
+    Held {
+        /// Outputs wait for Sync.
+        outputs: bool,
+        /// Inputs are held.
+        inputs: bool,
     },
     /// A start-up phase was entered.
     Phase {
@@ -459,6 +688,13 @@ pub enum Observation {
         /// Whose.
         publisher: Address,
     },
+    /// A publisher's reply came with another length than parameterised and was not taken over.
+    WrongLength {
+        /// Whose.
+        publisher: Address,
+        /// Its length (octets).
+        length: u8,
+    },
     /// A subscriber used a publisher's value at its T_O.
     Used {
         /// Whose.
@@ -511,7 +747,8 @@ pub struct Inputs {
 }
 
 impl Observation {
-    /// Whether this happens rarely and belongs into a log of events, rather than once or more in every cycle.
+    /// Whether this happens rarely and belongs into a log of events, rather than once or more in every cycle or in
+    /// words that another event has already.
     pub const fn is_event(&self) -> bool {
         !matches!(
             self,
@@ -522,36 +759,21 @@ impl Observation {
                 | Self::Latch { .. }
                 | Self::SetPoint { expected: true, .. }
                 | Self::Subscribed { .. }
+                | Self::WrongLength { .. }
                 | Self::Used { .. }
+                | Self::AcyclicDone { .. }
                 | Self::Gap { .. }
+                | Self::Lost { .. }
+                | Self::DiagnosisRead { .. }
+                | Self::TokenReceived { .. }
         )
     }
 }
 
-/// One line in the field's words.
-impl fmt::Display for Observation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Observation {
+    /// What is about acyclic services, as text; nothing for anything else.
+    fn fmt_acyclic(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::CycleStart { cycle, .. } => write!(f, "cycle {cycle} starts"),
-            Self::ExchangeDone { t_dx, retries } => write!(f, "T_DX {t_dx}, {retries} retries"),
-            Self::CycleSpare { acyclic, spare } => write!(f, "acyclic part and token {acyclic}, spare {spare}"),
-            Self::ClockLate { by } => write!(f, "SYNCH {by} late, the bus was in use"),
-            Self::MasterMode { from, to } => write!(f, "master {from} -> {to}"),
-            Self::Handler { slave, from, to } => write!(f, "slave {slave}: {from} -> {to}"),
-            Self::Retry { slave } => write!(f, "slave {slave}: request repeated"),
-            Self::NoAnswer { slave } => write!(f, "slave {slave}: no answer"),
-            Self::IllegalAnswer { slave } => write!(f, "slave {slave}: illegal answer"),
-            Self::Diagnosis { slave, status: [a, b, c] } => {
-                write!(f, "slave {slave}: diagnosis {a:02X} {b:02X} {c:02X}")
-            }
-            Self::Gap { address, answer } => write!(f, "GAP {address}: {answer}"),
-            Self::TokenClaimed => f.write_str("token claimed"),
-            Self::SlaveLife { slave, from, to, tripped } => {
-                write!(f, "slave {slave}: its sign of life {from} -> {to}{}", if *tripped { ", FAULT" } else { "" })
-            }
-            Self::MasterLifeHeld { slave, held } => {
-                write!(f, "master sign of life for {slave} {}", if *held { "held" } else { "running" })
-            }
             Self::ParameterRequest { slave, pnu, subindex, elements, change } => {
                 let verb = if *change { "change" } else { "read" };
                 write!(f, "slave {slave}: {verb} P{pnu}[{subindex}], {elements} elements, {}", parameter::name(*pnu))
@@ -565,12 +787,30 @@ impl fmt::Display for Observation {
                 write!(f, "slave {slave}: P{pnu}[{subindex}] error {number:02X}, {name}")
             }
             Self::AcyclicFailed { slave, why } => write!(f, "slave {slave}: acyclic request failed, {why}"),
-            Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
-            Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
+            Self::AcyclicData { slave, service, record, len, head } => {
+                write!(f, "slave {slave}: {service}")?;
+                if let Some((slot, index)) = record {
+                    write!(f, " slot {slot} index {index}")?;
+                }
+                write!(f, ", {len} octets")?;
+                head.iter().take((*len).into()).try_for_each(|octet| write!(f, " {octet:02X}"))?;
+                if usize::from(*len) > head.len() { f.write_str(" ...") } else { Ok(()) }
+            }
+            Self::AcyclicDone { slave, class, result, took } => {
+                write!(f, "slave {slave}: acyclic service of {class} {result} after {took}")
+            }
+            Self::Connection { peer, sap, from, to, why } => {
+                write!(f, "MS2 with {peer} at SAP {sap}: {from} -> {to} ({why})")
+            }
+            _ => Ok(()),
+        }
+    }
+    /// What happens at the instants of a slave's clock, as text; nothing for anything else.
+    fn fmt_clock(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             Self::Clock { verdict, error, window, counter, .. } => {
                 write!(f, "clock {verdict}, error {error}, window {window}, failure counter {counter}")
             }
-            Self::Pll { from, to } => write!(f, "PLL {from} -> {to}"),
             Self::Latch { locked, inputs } => {
                 write!(f, "latch {} ({})", inputs.xist1, if *locked { "at T_I" } else { "free-running" })
             }
@@ -578,16 +818,116 @@ impl fmt::Display for Observation {
                 let verdict = if *expected { "expected" } else { "NOT EXPECTED" };
                 write!(f, "T_O, master sign of life {mls} {verdict}, own {sls}, failure counter {counter}")
             }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// One line in the field's words.
+impl fmt::Display for Observation {
+    #[allow(clippy::too_many_lines, reason = "a line for each observation")]
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::CycleStart { cycle, .. } => write!(f, "cycle {cycle} starts"),
+            Self::ExchangeDone { t_dx, retries } => write!(f, "T_DX {t_dx}, {retries} retries"),
+            Self::CycleSpare { acyclic, spare } => write!(f, "acyclic part and token {acyclic}, spare {spare}"),
+            Self::ClockLate { by } => write!(f, "SYNCH {by} late, the bus was in use"),
+            Self::SynchMissed { cycles } => write!(f, "{cycles} SYNCH missed, the token was away"),
+            Self::MasterMode { from, to } => write!(f, "master {from} -> {to}"),
+            Self::Handler { slave, from, to } => write!(f, "slave {slave}: {from} -> {to}"),
+            Self::Retry { slave } => write!(f, "slave {slave}: request repeated"),
+            Self::NoAnswer { slave } => write!(f, "slave {slave}: no answer"),
+            Self::IllegalAnswer { slave } => write!(f, "slave {slave}: illegal answer"),
+            Self::Lost { slave } => write!(f, "slave {slave}: left data exchange"),
+            Self::DiagnosisRead { slave } => write!(f, "slave {slave}: diagnosis read"),
+            Self::Diagnosis { .. }
+            | Self::ExtendedDiagnosis { .. }
+            | Self::DiagnosisDue { .. }
+            | Self::Control { .. }
+            | Self::AutoClear { .. }
+            | Self::Held { .. } => self.fmt_services(f),
+            Self::Gap { address, answer } => write!(f, "GAP {address}: {answer}"),
+            Self::TokenClaimed => f.write_str("token claimed"),
+            Self::TokenReceived { .. }
+            | Self::TokenRetry { .. }
+            | Self::TokenDropped { .. }
+            | Self::RingEntered
+            | Self::RingLeft { .. }
+            | Self::AddressConflict
+            | Self::StationJoined { .. }
+            | Self::StationLost { .. } => self.fmt_ring(f),
+            Self::SlaveLife { slave, from, to, tripped } => {
+                write!(f, "slave {slave}: its sign of life {from} -> {to}{}", if *tripped { ", FAULT" } else { "" })
+            }
+            Self::MasterLifeHeld { slave, held } => {
+                write!(f, "master sign of life for {slave} {}", if *held { "held" } else { "running" })
+            }
+            Self::ParameterRequest { .. }
+            | Self::ParameterValue { .. }
+            | Self::ParameterError { .. }
+            | Self::AcyclicFailed { .. }
+            | Self::AcyclicData { .. }
+            | Self::AcyclicDone { .. }
+            | Self::Connection { .. } => self.fmt_acyclic(f),
+            Self::SlaveState { from, to, cause } => write!(f, "{from} -> {to} ({cause})"),
+            Self::Phase { from, to } => write!(f, "phase {from} -> {to}"),
+            Self::Clock { .. } | Self::Latch { .. } | Self::SetPoint { .. } => self.fmt_clock(f),
+            Self::Pll { from, to } => write!(f, "PLL {from} -> {to}"),
             Self::MasterLife { from, to } => write!(f, "master sign of life {from} -> {to}"),
             Self::Fault { code } => write!(f, "fault {code:04X}"),
             Self::Acknowledged { code } => write!(f, "fault {code:04X} acknowledged"),
             Self::Leds { from, to } => write!(f, "LEDs red/green {from} -> {to}"),
             Self::Power { on } => write!(f, "supply {}", if *on { "on" } else { "off" }),
             Self::Subscribed { publisher } => write!(f, "data of publisher {publisher}"),
+            Self::WrongLength { publisher, length } => {
+                write!(f, "{length} octets of publisher {publisher}, wrong length")
+            }
             Self::Used { publisher, position } => write!(f, "position {position} of publisher {publisher} used"),
             Self::Link { publisher, from, to } => write!(f, "link to {publisher}: {from} -> {to}"),
             Self::Collision { with } => write!(f, "collision with {with}"),
             Self::Disturbed { how } => write!(f, "disturbed: {how}"),
+        }
+    }
+}
+
+impl Observation {
+    /// What DP services do beside Data_Exchange, as text; nothing for anything else.
+    fn fmt_services(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Diagnosis { slave, status: [a, b, c] } => {
+                write!(f, "slave {slave}: diagnosis {a:02X} {b:02X} {c:02X}")
+            }
+            Self::ExtendedDiagnosis { slave, length, first } => {
+                write!(f, "slave {slave}: extended diagnosis of {length} octets")?;
+                let shown = usize::from(*length).min(first.len());
+                if shown > 0 {
+                    f.write_str(":")?;
+                }
+                first[..shown].iter().try_for_each(|octet| write!(f, " {octet:02X}"))?;
+                if shown < usize::from(*length) { f.write_str(" ...") } else { Ok(()) }
+            }
+            Self::DiagnosisDue { slave } => write!(f, "slave {slave}: reply of high priority, its diagnosis is due"),
+            Self::Control { octets: [command, groups] } => write!(f, "Global_Control {command:02X} {groups:02X}"),
+            Self::AutoClear { slave } => write!(f, "slave {slave}: no Data_Exchange for Data_Control_Time, AutoClear"),
+            Self::Held { outputs, inputs } => {
+                let word = |on: bool| if on { "on" } else { "off" };
+                write!(f, "Sync mode {}, Freeze mode {}", word(*outputs), word(*inputs))
+            }
+            _ => Ok(()),
+        }
+    }
+    /// What happens in the token ring, as text; nothing for anything else.
+    fn fmt_ring(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TokenReceived { t_rr, t_th } => write!(f, "token received after T_RR {t_rr}, T_TH {t_th}"),
+            Self::TokenRetry { to } => write!(f, "token to {to} repeated"),
+            Self::TokenDropped { why } => write!(f, "token given up: {why}"),
+            Self::RingEntered => f.write_str("entered the ring"),
+            Self::RingLeft { why } => write!(f, "left the ring: {why}"),
+            Self::AddressConflict => f.write_str("another station has this address, offline"),
+            Self::StationJoined { station } => write!(f, "station {station} joins the ring"),
+            Self::StationLost { station } => write!(f, "station {station} took no token and leaves the ring"),
+            _ => Ok(()),
         }
     }
 }

@@ -20,7 +20,10 @@ const START: u64 = 1_000;
 const WATCHED: u64 = 1_000;
 
 fn reference(sets: &[(&str, &str)]) -> Scenario {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/reference.toml");
+    shipped("reference", sets)
+}
+fn shipped(name: &str, sets: &[(&str, &str)]) -> Scenario {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{name}.toml"));
     let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
     Scenario::load(&path, &sets).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -52,6 +55,14 @@ fn a_running_network_allocates_nothing() {
 }
 
 #[test]
+fn repeaters_with_jitter_allocate_nothing() {
+    let sets = [("run.duration", "10 s"), ("repeater.1.jitter", "50 ns"), ("repeater.2.jitter", "100 ns")];
+    let scenario = shipped("repeaters", &sets);
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&scenario), 0);
+    assert_eq!(allocations::<HeapQueue<NetworkEvent>>(&scenario), 0);
+}
+
+#[test]
 fn a_fault_and_its_acknowledgement_allocate_nothing() {
     let scenario = reference(&[]);
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/reference.toml"));
@@ -61,4 +72,23 @@ fn a_fault_and_its_acknowledgement_allocate_nothing() {
            [[disturbance]]\nkind = \"lost-telegrams\"\nfrom = 4\nfrom_cycle = 300\nevery = 50\n";
     let disturbed = Scenario::parse(&scenario.name, "disturbed", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
+}
+
+#[test]
+fn a_token_that_goes_round_allocates_nothing() {
+    for set in [("bus.gap_factor", "20"), ("bus.gap_factor", "1"), ("bus.t_tr", "300000 tbit")] {
+        assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("two-masters", &[set])), 0, "{set:?}");
+    }
+}
+
+#[test]
+fn class_2_masters_allocate_nothing() {
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("class2-beside", &[])), 0);
+}
+
+#[test]
+fn links_in_both_tables_and_a_lost_publisher_allocate_nothing() {
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-network", &[])), 0);
+    let sets = [("run.duration", "5 s"), ("event.1.at", "2.2 s"), ("event.2.at", "4.5 s")];
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-lost-publisher", &sets)), 0);
 }

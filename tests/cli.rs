@@ -289,13 +289,24 @@ error: scene.toml:14:7: slave.3.t_o: T_O = 250 us is too early for slave 3
     );
     room.refuses_scene(
         "\"3..4\"",
-        "\"3, 6..90\"",
+        "\"3, 6..34\"",
         r#"
-error: scene.toml:12:8: master.t_dp: T_DP = 2 ms cannot hold the cycle of 87 slaves
+error: scene.toml:12:8: master.t_dp: T_DP = 2 ms cannot hold the cycle of 31 slaves
   12 | t_dp = "2 ms"
      |        ^^^^^^
-  rule: T_DP >= T_DX 9.167 ms + GAP 95.167 us + token 9.083 us + Global_Control 18.25 us = 9.289 ms (manual 3.3.2)
-  help: the shortest is t_dp = "9.625 ms"
+  rule: T_DP >= T_DX 3.306 ms + GAP 95.167 us + token 9.083 us + Global_Control 18.25 us = 3.428 ms (manual 3.3.2)
+  help: the shortest is t_dp = "3.75 ms"
+"#,
+    );
+    room.refuses_scene(
+        "\"3..4\"",
+        "\"3, 6..35\"",
+        r#"
+error: scene.toml:18:13: slave.35.address: 33 stations and repeaters are too many
+  18 | addresses = "3, 6..35"
+     |             ^^^^^^^^^^
+  rule: a segment has at most 32 loads, each station and each repeater or link module on it counts as one (EN 50170-2, RS 485)
+  help: divide it: [[segment]] with name and cable, [[repeater]] with from and to, and segment for each station
 "#,
     );
 }

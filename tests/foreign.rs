@@ -282,5 +282,5 @@ fn pictures_are_well_formed_and_say_what_they_show() {
         assert!(lines.iter().any(|line| line.contains(name)), "{}: {lines:?}", path.display());
         assert!(!picture.contains("NaN"), "{}", path.display());
     }
-    assert_eq!(count, 7);
+    assert_eq!(count, 8);
 }

@@ -273,7 +273,7 @@ fn v21_clocking_dialog() {
     };
     let network = with("125 us", "625 us").expect("what the dialog offers");
     let plan = Plan::of(&network);
-    let device = network.slaves[0].device;
+    let device = &network.slaves[0].device;
     assert_eq!(plan.t_dx, BitRate::M1_5.span(Tbit(150 + 143 + 150 + 231)));
     assert_eq!((device.t_i_min(false), plan.t_o_min(device)), (Span::from_us(125), Span::from_us(625)));
     for (t_i, t_o, key) in [("125 us", "500 us", "t_o"), ("0 us", "625 us", "t_i")] {

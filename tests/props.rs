@@ -19,7 +19,7 @@ use crate::support::Run;
 /// Grid of all times here.
 const GRID: Span = Span::from_us(125);
 
-fn config(cases: u32) -> ProptestConfig {
+pub(crate) fn config(cases: u32) -> ProptestConfig {
     let default = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
     let cases = if env::var_os("PROPTEST_CASES").is_some() { default.cases } else { cases };
     let drawn = env::var_os("PROPTEST_RNG_SEED").is_some();

@@ -36,6 +36,9 @@ pub(crate) const GET_CFG: (Sap, Sap) = (Sap::GET_CFG, Sap::MASTER_MS0);
 pub(crate) const RD_INP: (Sap, Sap) = (Sap::RD_INP, Sap::MASTER_MS0);
 pub(crate) const RD_OUTP: (Sap, Sap) = (Sap::RD_OUTP, Sap::MASTER_MS0);
 pub(crate) const MS1: (Sap, Sap) = (Sap::MS1, Sap::MASTER_MS1);
+/// The resource manager and the first connection of MS2.
+pub(crate) const MS2_RM: (Sap, Sap) = (Sap::MS2_RM, Sap::MASTER_MS2);
+pub(crate) const MS2: [(Sap, Sap); 2] = [(Sap(0), Sap::MASTER_MS2), (Sap(1), Sap::MASTER_MS2)];
 /// The master, the encoder and a second master.
 pub(crate) const MASTER: u8 = 2;
 pub(crate) const ENCODER: u8 = 6;

@@ -12,7 +12,6 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use isodp::observation::{ClockVerdict, LifeState, LinkState, Observation, Phase, PllState};
-use isodp::sim::bus::Place;
 use isodp::study::plan::Plan;
 use isodp::study::row::{CycleRow, SlaveRow};
 use isodp::study::scenario::Scenario;
@@ -50,8 +49,19 @@ const ERROR: u16 = 0x8000;
 fn every_shipped_scenario_has_a_test_and_says_what_it_asks() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     let files = std::fs::read_dir(directory).expect("the scenarios").map(|entry| entry.expect("a file").path());
+    let files = files.filter(|path| path.is_file());
     let names: BTreeSet<_> = files.filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect();
-    let tested = || TESTS.iter().chain(crate::encoder_scenarios::TESTS);
+    let tables = [
+        TESTS,
+        crate::encoder_scenarios::TESTS,
+        crate::dp_services::TESTS,
+        crate::dxb::TESTS,
+        crate::topology::TESTS,
+        crate::ring::TESTS,
+        crate::gsd::TESTS,
+        crate::acyclic::TESTS,
+    ];
+    let tested = || tables.into_iter().flatten();
     assert_eq!(names, tested().map(|(name, _)| format!("{name}.toml")).collect());
     for &(name, _) in tested() {
         let question = scenario(name, &[]).question;
@@ -63,15 +73,6 @@ fn every_shipped_scenario_has_a_test_and_says_what_it_asks() {
 /// `bits` at the scenario's rate.
 fn tbit(scenario: &Scenario, bits: u32) -> Span {
     scenario.bus.params.span(Tbit(bits))
-}
-
-/// Delay of the line between two stations.
-fn t_td(scenario: &Scenario, a: Address, b: Address) -> Span {
-    let place = |station| {
-        let master = (station == scenario.master.address).then_some(scenario.master.position_mm);
-        Place::at(master.unwrap_or_else(|| scenario.slave(station).expect("a slave").position_mm))
-    };
-    place(a).delay(place(b))
 }
 
 /// T_SDR in the simulation: the slave's own, or min_TSDR where that is longer, T_ID1 for publishers (Model: D2, D27).
@@ -88,11 +89,11 @@ fn reply_end(scenario: &Scenario, slave: Address) -> Span {
     let master = scenario.master.address;
     let mut at = tbit(scenario, params.t_id2().0);
     for other in scenario.configured().map(|slave| slave.address) {
-        let cycle = tbit(scenario, 143 + t_sdr(scenario, other) + 231) + t_td(scenario, master, other);
+        let cycle = tbit(scenario, 143 + t_sdr(scenario, other) + 231) + scenario.delay(master, other);
         if other == slave {
             return at + cycle;
         }
-        at += cycle + t_td(scenario, master, other) + tbit(scenario, params.t_id1().0);
+        at += cycle + scenario.delay(master, other) + tbit(scenario, params.t_id1().0);
     }
     panic!("no slave {slave}")
 }
@@ -100,7 +101,7 @@ fn reply_end(scenario: &Scenario, slave: Address) -> Span {
 /// T_DX with the simulated T_SDR.
 fn t_dx(scenario: &Scenario) -> Span {
     let last = scenario.configured().last().expect("a slave").address;
-    reply_end(scenario, last) + t_td(scenario, scenario.master.address, last)
+    reply_end(scenario, last) + scenario.delay(scenario.master.address, last)
 }
 
 /// Every T_DX of a run from `from` on. Crystals of ±50 ppm count it 100 ppm apart at most.
@@ -152,7 +153,7 @@ fn assert_skew(scenario: &Scenario, run: &Run) {
     let mut encoders = scenario.slaves.iter().filter(|slave| !slave.device.subscriber);
     let first = encoders.next().expect("an encoder");
     let last = encoders.next_back().expect("another one");
-    let line = t_td(scenario, first.address, last.address);
+    let line = scenario.delay(first.address, last.address);
     let t_i = Span::from_ticks(first.times.t_i.ticks() / 10_000);
     let most = line + Span::from_ticks(QUANTUM.ticks() * 255 / 100) + t_i;
     let skews: Vec<_> = settled(run).map(|row| row.latch_skew.expect("all are locked")).collect();
@@ -170,7 +171,7 @@ fn assert_latch_offsets(scenario: &Scenario, run: &Run, bound: Span) {
         let slave = scenario.slave(row.slave).expect("a slave");
         let loop_part = Span::from_ticks((bound.ticks() + QUANTUM.ticks() / 2) * 155 / 100 + 1);
         let t_i = Span::from_ticks(slave.times.t_i.ticks() / 10_000);
-        let middle = t_td(scenario, scenario.master.address, row.slave) - Span::from_ticks(QUANTUM.ticks() / 2);
+        let middle = scenario.delay(scenario.master.address, row.slave) - Span::from_ticks(QUANTUM.ticks() / 2);
         let off = row.latch_offset.expect("locked") - middle - slave.times.t_pll_d;
         let range = -loop_part - t_i..=loop_part + QUANTUM + t_i;
         assert!(range.contains(&off), "slave {} cycle {}: {off} not in {range:?}", row.slave, row.cycle);
@@ -217,7 +218,7 @@ fn startup() {
     assert_eq!([40, 41, 42].map(|k| run.reply(3, k).expect("a reply").zsw2.sign_of_life().get()), [0, 1, 2]);
     // No crystal is off: nothing but the line and the timer grid moves a latch.
     for row in run.slaves.iter().filter(|row| row.latch_offset.is_some()) {
-        let late = row.latch_offset.expect("locked") - t_td(&network, network.master.address, row.slave);
+        let late = row.latch_offset.expect("locked") - network.delay(network.master.address, row.slave);
         assert!(-QUANTUM < late && late <= Span::ZERO, "{late}");
     }
     let both = |row: &&CycleRow| (105..298).contains(&row.cycle);
@@ -399,7 +400,7 @@ fn slave_to_slave() {
     let links: Vec<_> = network.links.iter().map(|link| (link.publisher, link.subscriber)).collect();
     assert_eq!(links.len(), 5);
     for (publisher, subscriber) in links {
-        let line = t_td(&network, publisher, subscriber);
+        let line = network.delay(publisher, subscriber);
         let rows: Vec<_> = (run.links.iter())
             .filter(|row| (row.publisher, row.subscriber) == (publisher, subscriber))
             .filter(|row| (operation..300).contains(&row.cycle) || (303..665).contains(&row.cycle))
@@ -429,7 +430,7 @@ fn assert_lost_publisher(network: &Scenario, run: &Run) {
         .filter(|row| matches!(row.what, Observation::Link { to: LinkState::Lost, .. }));
     assert_eq!(states.count(), 0, "three cycles are far below the watchdog time");
     // A request without answer takes T_SL instead of T_SDR, reply and line.
-    let line = t_td(network, network.master.address, address(4));
+    let line = network.delay(network.master.address, address(4));
     let answered = tbit(network, t_sdr(network, address(4)) + 231) + line * 2;
     let unanswered = tbit(network, network.bus.params.t_sl.0);
     let once = unanswered - answered;
@@ -469,7 +470,7 @@ fn slow_bus() {
     let bits = 150 + 3 * (143 + 150 + 231) + 2 * 37;
     let line = Span::from_us(4);
     assert!((plan.t_dx - tbit(&network, bits) - line).abs() <= Span::from_ticks(6), "{}", plan.t_dx);
-    assert_eq!(plan.t_o_min(network.slaves[0].device), network.slaves[0].times.t_o);
+    assert_eq!(plan.t_o_min(&network.slaves[0].device), network.slaves[0].times.t_o);
     assert_undisturbed(&network, &run);
     assert_t_dx(&network, &run, last_lock(&run));
     assert_latch_offsets(&network, &run, Span::from_ns(400));
@@ -481,7 +482,7 @@ fn fast_cycle() {
     let network = scenario("fast-cycle", &[]);
     let run = Run::of(&network);
     let plan = Plan::of(&network);
-    assert_eq!(plan.t_o_min(network.slaves[0].device), Span::from_us(625));
+    assert_eq!(plan.t_o_min(&network.slaves[0].device), Span::from_us(625));
     assert_undisturbed(&network, &run);
     assert_t_dx(&network, &run, last_lock(&run));
     assert_latch_offsets(&network, &run, Span::from_ns(400));
@@ -534,7 +535,7 @@ fn full_segment() {
     let run = Run::of(&network);
     let plan = Plan::of(&network);
     assert_eq!(1 + network.slaves.len(), 32);
-    let device = network.slaves[0].device;
+    let device = &network.slaves[0].device;
     let bits = 800 + 31 * (143 + 800 + 231) + 30 * 76;
     // Slaves sit at 1/31 to 31/31 of 500 ns: twice 16 times 500 ns for all.
     let line = Span::from_us(16);

@@ -7,13 +7,21 @@ use isodp::study::scenario::{Scenario, ScenarioError};
 
 use crate::support::Run;
 
-/// Encoders from address 3 on, in a network of these times.
+/// Encoders from address 3 on, in a network of these times; more than 30 on two segments.
 fn network(rate: &str, slaves: u8, t_dp: &str, t_o: &str, more: &str) -> Result<Scenario, ScenarioError> {
     let mut text = format!(
         "[run]\ncycles = 1000\n[bus]\nrate = \"{rate}\"\n[master]\naddress = 2\nt_dp = \"{t_dp}\"\nt_i = \"125 us\"\n\
          t_o = \"{t_o}\"\n{more}\n"
     );
-    let _ = write!(text, "[[slave]]\naddresses = \"3..{}\"\ndevice = \"simodrive-sensor-isochron\"\n", slaves + 2);
+    let device = "device = \"simodrive-sensor-isochron\"\n";
+    if slaves > 30 {
+        text = text.replace("[master]", "[master]\nsegment = \"a\"");
+        text += "[[segment]]\nname = \"a\"\n[[segment]]\nname = \"b\"\n[[repeater]]\nfrom = \"a\"\nto = \"b\"\n";
+        let _ = write!(text, "[[slave]]\naddresses = \"33..{}\"\nsegment = \"b\"\n{device}", slaves + 2);
+        let _ = write!(text, "[[slave]]\naddresses = \"3..32\"\nsegment = \"a\"\n{device}");
+    } else {
+        let _ = write!(text, "[[slave]]\naddresses = \"3..{}\"\n{device}", slaves + 2);
+    }
     Scenario::parse("network", "network.toml", &text, &[])
 }
 fn all_operate(scenario: &Scenario) {

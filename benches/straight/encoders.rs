@@ -1,5 +1,7 @@
 //! Networks of encoders of any number, and what their start-up settles.
 
+use std::fmt::Write as _;
+
 use isodp::device::node::Node;
 use isodp::observation::{ClockVerdict, HandlerState, Observation, Phase};
 use isodp::sim::crystal::Crystal;
@@ -16,19 +18,50 @@ const MASTER: u8 = 2;
 /// Cycles after which every network has long started up.
 const ENOUGH: u64 = 20_000;
 
+/// Most encoders of a segment: with two repeaters it has 32 loads.
+const PER_SEGMENT: u8 = 30;
+
+/// The segments of so many encoders, one behind the other with repeaters between them, and the encoders on them.
+fn wiring(encoders: u8) -> String {
+    let segments = encoders.div_ceil(PER_SEGMENT);
+    let mut text = String::new();
+    for number in 0..segments {
+        let first = MASTER + 1 + number * PER_SEGMENT;
+        let last = (first + PER_SEGMENT - 1).min(MASTER + encoders);
+        let _ = write!(
+            text,
+            r#"
+            [[segment]]
+            name = "{number}"
+            cable = "20 m"
+            [[slave]]
+            addresses = "{first}..{last}"
+            segment = "{number}"
+            device = "posital-ocd-dpb1b"
+            crystal = {{ within = "50 ppm" }}
+            motion = {{ kind = "speed", speed = "1500 rpm" }}
+            "#
+        );
+        if number > 0 {
+            let _ = write!(text, "[[repeater]]\nfrom = \"{}\"\nto = \"{number}\"\n", number - 1);
+        }
+    }
+    text
+}
+
 /// A network of so many encoders, 1 to 122, with these times. The watchdog is longer than the start-up of all of them,
 /// in which each is asked only once in so many cycles.
 fn timed(encoders: u8, t_dp: Span, t_o: Span) -> Scenario {
-    let (first, last) = (MASTER + 1, MASTER + encoders);
+    let wiring = wiring(encoders);
     let text = format!(
         r#"
         [run]
         cycles = 1_000
         [bus]
         rate = "12 Mbit/s"
-        cable = "100 m"
         [master]
         address = {MASTER}
+        segment = "0"
         t_dp = "{t_dp}"
         t_i = "125 us"
         t_o = "{t_o}"
@@ -36,11 +69,7 @@ fn timed(encoders: u8, t_dp: Span, t_o: Span) -> Scenario {
         watchdog = "10 s"
         gc_jitter = {{ kind = "bounded-normal", sigma = "100 ns", bound = "400 ns" }}
         crystal = {{ within = "50 ppm" }}
-        [[slave]]
-        addresses = "{first}..{last}"
-        device = "posital-ocd-dpb1b"
-        crystal = {{ within = "50 ppm" }}
-        motion = {{ kind = "speed", speed = "1500 rpm" }}
+        {wiring}
         "#
     );
     Scenario::parse("encoders", "encoders", &text, &[]).unwrap_or_else(|error| panic!("{error}"))
@@ -50,9 +79,9 @@ fn timed(encoders: u8, t_dp: Span, t_o: Span) -> Scenario {
 pub(crate) fn scenario(encoders: u8) -> Scenario {
     let roomy = timed(encoders, Span::from_ms(32), Span::from_us(31_500));
     let (plan, slave) = (Plan::of(&roomy), &roomy.slaves[0]);
-    let t_o = plan.t_o_min(slave.device);
+    let t_o = plan.t_o_min(&slave.device);
     let t_dp = t_o + slave.times.t_i + slave.device.gap_min(slave.functions);
-    let t_dp = t_dp.ceil_to(slave.device.dp_grid()).max(plan.t_dp_min(slave.device));
+    let t_dp = t_dp.ceil_to(slave.device.dp_grid()).max(plan.t_dp_min(&slave.device));
     timed(encoders, t_dp, t_o)
 }
 

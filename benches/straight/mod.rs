@@ -28,7 +28,6 @@ use isodp::device::sensor::{Faults, Sensor, SensorOptions, Xist1, Xist2};
 use isodp::device::sign_of_life::{Counter, Monitor, MonitorSettings};
 use isodp::dp::GLOBAL_CONTROL;
 use isodp::observation::ClockVerdict;
-use isodp::sim::bus::Place;
 use isodp::sim::crystal::Crystal;
 use isodp::sim::motion::{Resolution, Shaft};
 use isodp::sim::noise::JitterSource;
@@ -180,7 +179,7 @@ impl Times {
 impl Slave {
     fn new(scenario: &Scenario, slave: &scenario::Slave, start: &StartUp) -> Self {
         let bus = &scenario.bus.params;
-        let profile = slave.device;
+        let profile = &slave.device;
         let (steps, revolutions) = (profile.steps_per_rev, profile.revolutions);
         let times = slave.times;
         let settings = PllSettings::new(scenario.master.t_dp, times.t_pll_w, times.t_pll_d);
@@ -189,7 +188,7 @@ impl Slave {
         let told = start.station(slave.address);
         Self {
             address: slave.address,
-            delay: Place::at(slave.position_mm).delay(Place::at(scenario.master.position_mm)),
+            delay: scenario.delay(slave.address, scenario.master.address),
             crystal: told.crystal().clone(),
             shaft: Shaft::new(&slave.motion).expect("a checked motion"),
             resolution: Resolution::new(steps, revolutions).expect("a profile's disc"),

@@ -3,7 +3,7 @@
 use crate::device::options::{Resolution, UnitOptions};
 use crate::device::parameters::{DeviceIdentification, Parameters, Refused, SensorFormat};
 use crate::device::position::{CodeSequence, Position, Scaling};
-use crate::device::profile::Profile;
+use crate::device::profile::Device;
 use crate::device::sensor::Preset;
 use crate::device::unit::{Function, Unit};
 use crate::dp::slave::Refusal;
@@ -21,7 +21,7 @@ const TELEGRAM: u16 = 81;
 /// What the encoder does with the raw position of its disc.
 #[derive(Clone, Debug)]
 pub struct Disc {
-    profile: &'static Profile,
+    profile: Device,
     resolution: Resolution,
     /// Absolute preset and relative shift. Model: D21; no parameter of these devices is writable.
     preset_value: i32,
@@ -33,7 +33,8 @@ impl Disc {
     ///
     /// # Panics
     /// If the disc has no position or more than 2^32: a mistake in the profile or the options.
-    pub fn new(profile: &'static Profile, options: &UnitOptions) -> Self {
+    pub fn new(profile: impl Into<Device>, options: &UnitOptions) -> Self {
+        let profile = profile.into();
         let resolution = options.resolution.unwrap_or(profile.resolution());
         let position = Position::new(resolution.steps_per_rev, resolution.revolutions, CodeSequence::Cw, None);
         let position = position.expect("an unscaled disc breaks no rule");
@@ -41,7 +42,7 @@ impl Disc {
     }
 
     /// P964. Model: the manuals print no values, so the manufacturer is 0 and the firmware as old as the manual.
-    const fn identification(&self) -> DeviceIdentification {
+    fn identification(&self) -> DeviceIdentification {
         let device_type = self.profile.ident;
         DeviceIdentification { manufacturer: 0, device_type, firmware: 0x0101, year: 2007, day_month: 101, axes: 1 }
     }

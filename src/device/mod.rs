@@ -34,7 +34,7 @@
 //! | 3.3.8 T_PLL_W | [`PllSettings`](pll::PllSettings) | `section_3_3_8_a_window_below_1_us_is_raised_silently` |
 //! | 3.3.9 T_PLL_D | [`PllSettings`](pll::PllSettings) | `section_3_3_9_t_pll_d_delays_the_latch_but_not_beyond_the_next_clock` |
 //! | 3.4 Slave-to-slave communication | [`Subscriber`](drive::Subscriber), [`Passive`](crate::fdl::passive::Passive) | `section_3_4_a_publisher_answers_msrd_to_everybody`, `slave_to_slave` |
-//! | 4 Acyclic services | [`Parameters`](parameters::Parameters), [`Server`](crate::dp::ms1::Server) | `section_4_the_five_parameters_read_as_real_devices_answer`, `section_4_p979_follows_the_scaling`, `section_4_all_are_read_only_and_others_are_unknown`, `section_4_wrong_records_get_the_code_of_dp_v1`, `section_4_one_request_at_a_time_and_none_outlives_data_exchange`, `section_4_without_dpv1_enable_the_access_point_is_closed`, `read_parameters` |
+//! | 4 Acyclic services | [`Parameters`](parameters::Parameters), [`Server`](crate::dp::ms1::Server), [`Manager`](crate::dp::ms2::Manager) | `section_4_the_five_parameters_read_as_real_devices_answer`, `section_4_p979_follows_the_scaling`, `section_4_all_are_read_only_and_others_are_unknown`, `section_4_wrong_records_get_the_code_of_dp_v1`, `section_4_one_request_at_a_time_and_none_outlives_data_exchange`, `section_4_without_dpv1_enable_the_access_point_is_closed`, `section_4_a_class_2_master_reads_whatever_the_master_does`, `section_4_each_connection_has_its_own_parameter_channel`, `section_4_a_connection_without_requests_is_aborted`, `read_parameters` |
 //! | 5 Error messages and diagnostics | [`Diagnosis`](crate::wire::diag::Diagnosis), [`SensorFault`](crate::wire::drive::SensorFault) | `section_5_1_the_diagnosis_has_six_octets`, `section_5_3_both_faults_pending_are_shown_in_the_order_of_their_coming` |
 //! | 5.1 Profibus diagnostics | [`Diagnosis`](crate::wire::diag::Diagnosis) | `section_5_1_the_diagnosis_has_six_octets`, `parameter_fault`, `configuration_fault` |
 //! | 5.2 LEDs | [`LedLogic`](leds::LedLogic), [`Leds`](crate::observation::Leds) | `section_5_2_the_six_patterns_on_the_bench`, `section_5_2_with_the_watchdog_off_a_cut_line_stays_data_exchange`, `leds` |
@@ -45,6 +45,7 @@ pub mod drive;
 pub mod encoder;
 pub mod isochronous;
 pub mod leds;
+pub mod links;
 pub mod node;
 pub mod options;
 pub mod parameter_client;
@@ -54,4 +55,5 @@ pub mod position;
 pub mod profile;
 pub mod sensor;
 pub mod sign_of_life;
+pub mod tool;
 pub mod unit;

@@ -3,11 +3,14 @@
 use crate::device::controller::{Command as ControllerCommand, Controller};
 use crate::device::drive::Drive;
 use crate::device::encoder::Encoder;
+use crate::device::tool::Tool;
+use crate::dp::class2::Class2;
 use crate::dp::handler::{Patch, StartupTelegram};
 use crate::dp::master::{Master, Order};
 use crate::fdl::{Filter, Input, Outbox, Station};
 use crate::observation::MasterMode;
 use crate::wire::Address;
+use crate::wire::control::GlobalControl;
 
 /// What a scenario may order a node to do.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -16,6 +19,8 @@ pub enum Command {
     Mode(MasterMode),
     /// A slave is started anew with a changed telegram.
     Patch(Address, StartupTelegram, Patch),
+    /// Sync, Freeze and their ends, to the master.
+    Control(GlobalControl),
     /// Something for the master's application.
     Application(ControllerCommand),
 }
@@ -26,6 +31,8 @@ pub enum Command {
 pub enum Node {
     /// A class 1 master with its application.
     Master(Master<Controller>),
+    /// A class 2 master with its jobs.
+    Class2(Class2<Tool>),
     /// An absolute encoder.
     Encoder(Encoder),
     /// A slave with the subscriber function.
@@ -40,6 +47,7 @@ impl Station for Node {
     fn address(&self) -> Address {
         match self {
             Self::Master(master) => master.address(),
+            Self::Class2(master) => master.address(),
             Self::Encoder(encoder) => encoder.address(),
             Self::Drive(drive) => drive.address(),
             Self::Silent(address) => *address,
@@ -48,6 +56,7 @@ impl Station for Node {
     fn filter(&self) -> Filter {
         match self {
             Self::Master(master) => master.filter(),
+            Self::Class2(master) => master.filter(),
             Self::Encoder(encoder) => encoder.filter(),
             Self::Drive(drive) => drive.filter(),
             Self::Silent(address) => Filter::own(*address),
@@ -59,9 +68,15 @@ impl Station for Node {
                 let input = input.map_command(|command| match command {
                     Command::Mode(mode) => Some(Order::Mode(mode)),
                     Command::Patch(slave, telegram, patch) => Some(Order::Patch(slave, telegram, patch)),
+                    Command::Control(control) => Some(Order::Control(control)),
                     Command::Application(command) => Some(Order::Application(command)),
                 });
                 if let Some(input) = input {
+                    master.step(now, input, out);
+                }
+            }
+            Self::Class2(master) => {
+                if let Some(input) = input.map_command(|_| None) {
                     master.step(now, input, out);
                 }
             }

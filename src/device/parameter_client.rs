@@ -9,10 +9,8 @@
 //! | any | anything else | the failure is told; the next request |
 
 use alloc::collections::VecDeque;
-use alloc::vec;
-use alloc::vec::Vec;
 
-use crate::dp::ms1::{Failure, Job, MAX_PDU};
+use crate::dp::ms1::{Failure, Job, Pdu};
 use crate::fdl::Outbox;
 use crate::observation::{AcyclicFailure, Observation};
 use crate::wire::Address;
@@ -76,22 +74,10 @@ impl ParameterClient {
         }
         let (asked, stage) = self.running.as_ref()?;
         let pdu = match stage {
-            Stage::Written => self.write(asked),
-            Stage::Reading => emit(&Request::Read { record: CHANNEL, len: MAX_ANSWER }),
+            Stage::Written => write(self.reference, asked.parameter, asked.change),
+            Stage::Reading => read(),
         };
         Some(Job { slave: asked.slave, pdu })
-    }
-    fn write(&self, asked: &Asked) -> Vec<u8> {
-        let mut data = [0; MAX_ANSWER as usize];
-        let id = if asked.change.is_some() { RequestId::Change } else { RequestId::Read };
-        let octets = asked.change.map(|(format, value)| (format, value.to_be_bytes()));
-        let value = octets.as_ref().map(|(format, octets)| {
-            let from = octets.len() - format.size().min(octets.len());
-            Values { format: *format, data: &octets[from..] }
-        });
-        let head = (self.reference, id, 0);
-        let len = parameter::emit_request(head, &[asked.parameter], value.as_slice(), &mut data).unwrap_or(0);
-        emit(&Request::Write { record: CHANNEL, data: &data[..len] })
     }
 
     /// Takes what became of the job.
@@ -100,26 +86,56 @@ impl ParameterClient {
         let failed = |why| Observation::AcyclicFailed { slave: asked.address, why };
         let response = match answer {
             Ok(pdu) => Response::parse(pdu),
-            Err(Failure::Closed) => return out.observe(failed(AcyclicFailure::Closed)),
-            Err(Failure::Timeout) => return out.observe(failed(AcyclicFailure::Timeout)),
-            Err(Failure::Left) => return out.observe(failed(AcyclicFailure::Left)),
+            Err(why) => return out.observe(failed(failure(why))),
         };
         match (stage, response) {
             (Stage::Written, Ok(Response::Write { .. })) => self.running = Some((asked, Stage::Reading)),
             (Stage::Reading, Ok(Response::Negative(negative))) if negative.code_1 == ErrorCode::STATE_CONFLICT => {
                 self.running = Some((asked, Stage::Reading));
             }
-            (Stage::Reading, Ok(Response::Read { data, .. })) => tell(&asked, data, out),
+            (Stage::Reading, Ok(Response::Read { data, .. })) => {
+                tell(asked.address, (asked.parameter, asked.change), data, out);
+            }
             (_, Ok(Response::Negative(negative))) => out.observe(failed(AcyclicFailure::Refused(negative.code_1))),
             _ => out.observe(failed(AcyclicFailure::Unreadable)),
         }
     }
 }
 
-/// Tells the values of an answer, or its errors.
-fn tell(asked: &Asked, data: &[u8], out: &mut Outbox) {
-    let slave = asked.address;
-    let ParameterAddress { pnu, subindex, .. } = asked.parameter;
+/// The PDU that writes a request for a parameter to the channel.
+pub(super) fn write(reference: u8, parameter: ParameterAddress, change: Option<(Format, u32)>) -> Pdu {
+    let mut data = [0; MAX_ANSWER as usize];
+    let id = if change.is_some() { RequestId::Change } else { RequestId::Read };
+    let octets = change.map(|(format, value)| (format, value.to_be_bytes()));
+    let value = octets.as_ref().map(|(format, octets)| {
+        let from = octets.len() - format.size().min(octets.len());
+        Values { format: *format, data: &octets[from..] }
+    });
+    let len = parameter::emit_request((reference, id, 0), &[parameter], value.as_slice(), &mut data).unwrap_or(0);
+    Pdu::of(&Request::Write { record: CHANNEL, data: &data[..len] })
+}
+/// The PDU that reads the answer from the channel.
+pub(super) fn read() -> Pdu {
+    Pdu::of(&Request::Read { record: CHANNEL, len: MAX_ANSWER })
+}
+/// Why a request has no answer, in the words of observations.
+pub(super) const fn failure(why: Failure) -> AcyclicFailure {
+    match why {
+        Failure::Closed => AcyclicFailure::Closed,
+        Failure::Timeout => AcyclicFailure::Timeout,
+        Failure::Left => AcyclicFailure::Left,
+        Failure::Aborted(reason) => AcyclicFailure::Aborted(reason),
+    }
+}
+
+/// Tells the values of the answer to a request, or its errors.
+pub(super) fn tell(
+    slave: Address,
+    (parameter, change): (ParameterAddress, Option<(Format, u32)>),
+    data: &[u8],
+    out: &mut Outbox,
+) {
+    let ParameterAddress { pnu, subindex, .. } = parameter;
     let Ok(response) = parameter::Response::parse(data) else {
         return out.observe(Observation::AcyclicFailed { slave, why: AcyclicFailure::Unreadable });
     };
@@ -127,7 +143,7 @@ fn tell(asked: &Asked, data: &[u8], out: &mut Outbox) {
     if response.values().map(|values| values.count().max(1)).sum::<usize>() > MAX_VALUES {
         return out.observe(Observation::AcyclicFailed { slave, why: AcyclicFailure::Unreadable });
     }
-    if let (ResponseId::Changed, Some((_, value))) = (response.id, asked.change) {
+    if let (ResponseId::Changed, Some((_, value))) = (response.id, change) {
         out.observe(Observation::ParameterValue { slave, pnu, subindex, value });
     }
     for values in response.values() {
@@ -145,16 +161,11 @@ fn tell(asked: &Asked, data: &[u8], out: &mut Outbox) {
     }
 }
 
-fn emit(request: &Request<'_>) -> Vec<u8> {
-    let mut pdu = vec![0; MAX_PDU];
-    let len = request.emit(&mut pdu).unwrap_or(0);
-    pdu.truncate(len);
-    pdu
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dp::ms1::MAX_PDU;
+    use alloc::vec;
 
     /// What a slave answers is data: also an answer that is far too long for one step.
     #[test]

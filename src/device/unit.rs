@@ -5,20 +5,28 @@
 //! is answered with the position at this request. After lock, T_O takes the control words over and T_I latches what
 //! the next request will find (Model: D8, D10).
 
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::device::isochronous::{IsoSettings, Isochronous};
 use crate::device::leds::{LedInput, LedLogic};
 use crate::device::options::UnitOptions;
-use crate::device::profile::Profile;
+use crate::device::profile::Device;
 use crate::device::sensor::{Answer, Faults, Preset, Sensor, SensorOptions, Xist1, Xist2};
-use crate::dp::ms1::Records;
-use crate::dp::slave::{Application, Identity, Refusal, Slave};
+use crate::dp::ms1::{Access, Records};
+use crate::dp::ms2;
+use crate::dp::slave::{ACYCLIC_TIME, Application, Identity, Refusal, Slave};
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
 use crate::observation::{self, Leds, Observation, Phase, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::Address;
 use crate::wire::acyclic::{ErrorCode, Record};
+use crate::wire::diag::DiagBuffer;
 use crate::wire::drive::{G1Zsw, Inputs81, Outputs81, SensorFault, Zsw2};
 use crate::wire::prm::{Block, BlockType, IsoM, SetPrm};
+
+/// Profile_Ident_Number of encoders in an MS2 connection.
+pub const PROFILE_IDENT: u16 = 0x3D00;
 
 /// What one kind of unit does and another does not.
 pub trait Function {
@@ -53,8 +61,18 @@ pub trait Function {
     fn publishers(&self) -> u128 {
         0
     }
+    /// Data exchange begins.
+    fn enter(&mut self, _now: Local, _out: &mut Outbox) {}
+    /// [`Timer::Links`] came due.
+    fn monitor(&mut self, _now: Local, _out: &mut Outbox) {}
     /// Data exchange is over.
     fn leave(&mut self, _out: &mut Outbox) {}
+    /// Writes the device's own part of the diagnosis.
+    fn diagnosis(&self, _diagnosis: &mut DiagBuffer) {}
+    /// Another number than before whenever [`diagnosis`](Self::diagnosis) writes something else.
+    fn diagnosis_revision(&self) -> u32 {
+        0
+    }
 }
 
 /// What is set at a unit, not by its master.
@@ -88,11 +106,12 @@ pub struct Unit<F> {
 /// The unit behind its DP slave.
 #[derive(Clone, Debug)]
 struct Body<F> {
-    profile: &'static Profile,
+    profile: Device,
     settings: UnitSettings,
     iso: Option<Isochronous>,
     sensor: Sensor,
-    channel: Channel,
+    /// The parameter channel of MS1, and behind it those of the MS2 connections.
+    channels: Vec<Channel>,
     function: F,
     outputs: Outputs81,
     /// Raw position of the last latch, for a preset.
@@ -107,24 +126,34 @@ struct Body<F> {
 
 impl<F: Function> Unit<F> {
     /// A unit of this kind without supply.
-    pub fn new(profile: &'static Profile, settings: UnitSettings, function: F) -> Self {
+    pub fn new(profile: impl Into<Device>, settings: UnitSettings, function: F) -> Self {
+        let profile = profile.into();
         let identity = Identity {
             address: settings.address,
             ident: profile.ident,
-            config: profile.config,
+            config: profile.config.clone(),
             outputs: profile.outputs,
             inputs: profile.inputs,
             fail_safe: profile.fail_safe,
             publisher: profile.publisher,
+            sync: profile.sync,
+            freeze: profile.freeze,
+            max_diag: profile.max_diag,
             rate: settings.rate,
             t_sdr: settings.t_sdr,
+            ms2: ms2::Settings {
+                connections: settings.options.ms2_connections,
+                send_timeout: ms2::send_timeout(settings.rate),
+                working: ACYCLIC_TIME,
+                profile_ident: PROFILE_IDENT,
+            },
         };
         let body = Body {
             profile,
             settings,
             iso: None,
             sensor: Sensor::new(settings.options.sensor),
-            channel: Channel::EMPTY,
+            channels: vec![Channel::EMPTY; 1 + usize::from(settings.options.ms2_connections)],
             function,
             outputs: Outputs81::default(),
             raw: 0,
@@ -137,6 +166,10 @@ impl<F: Function> Unit<F> {
     /// The DP slave.
     pub const fn slave(&self) -> &Slave {
         &self.slave
+    }
+    /// What makes it this kind of unit.
+    pub const fn function(&self) -> &F {
+        &self.body.function
     }
     /// Start-up phase now.
     pub fn phase(&self) -> Phase {
@@ -168,7 +201,6 @@ impl<F: Function> Body<F> {
             iso.leave(out);
         }
         self.sensor = Sensor::new(self.settings.options.sensor);
-        self.channel = Channel::EMPTY;
         self.causes = Faults::NONE;
         self.answer = Answer::NONE;
         self.outputs = Outputs81::default();
@@ -299,19 +331,36 @@ impl Channel {
     }
 }
 
+impl<F: Function> Body<F> {
+    fn channel(&mut self, access: Access) -> Option<&mut Channel> {
+        let index = match access {
+            Access::Ms1 => 0,
+            Access::Ms2(connection) => 1 + usize::from(connection),
+        };
+        self.channels.get_mut(index)
+    }
+}
+
 impl<F: Function> Records for Body<F> {
-    fn read(&mut self, record: Record, out: &mut [u8]) -> Result<usize, ErrorCode> {
+    fn read(&mut self, access: Access, record: Record, out: &mut [u8]) -> Result<usize, ErrorCode> {
         Channel::check(record)?;
-        let len = self.channel.len.ok_or(ErrorCode::STATE_CONFLICT)?;
-        out.get_mut(..len).ok_or(ErrorCode::READ_CONSTRAINT)?.copy_from_slice(&self.channel.octets[..len]);
+        let channel = self.channel(access).ok_or(ErrorCode::UNAVAILABLE)?;
+        let len = channel.len.ok_or(ErrorCode::STATE_CONFLICT)?;
+        out.get_mut(..len).ok_or(ErrorCode::READ_CONSTRAINT)?.copy_from_slice(&channel.octets[..len]);
         Ok(len)
     }
-    fn write(&mut self, record: Record, data: &[u8]) -> Result<(), ErrorCode> {
+    fn write(&mut self, access: Access, record: Record, data: &[u8]) -> Result<(), ErrorCode> {
         Channel::check(record)?;
-        self.channel.len = None;
-        let len = self.function.parameters(self.settings.address, data, &mut self.channel.octets)?;
-        self.channel.len = Some(len);
-        Ok(())
+        let mut octets = [0; Channel::MAX];
+        let answer = self.function.parameters(self.settings.address, data, &mut octets);
+        let channel = self.channel(access).ok_or(ErrorCode::UNAVAILABLE)?;
+        *channel = Channel { octets, len: answer.ok() };
+        answer.map(|_| ())
+    }
+    fn closed(&mut self, access: Access) {
+        if let Some(channel) = self.channel(access) {
+            channel.len = None;
+        }
     }
 }
 
@@ -350,8 +399,9 @@ impl<F: Function> Application for Body<F> {
         self.sensor = Sensor::new(SensorOptions { preset_enabled, ..self.settings.options.sensor });
         self.function.parameterise(prm, watchdog);
     }
-    fn enter(&mut self, _now: Local, out: &mut Outbox) {
+    fn enter(&mut self, now: Local, out: &mut Outbox) {
         out.sample_with_telegrams(true);
+        self.function.enter(now, out);
     }
     fn leave(&mut self, _now: Local, out: &mut Outbox) {
         self.reset(out);
@@ -368,6 +418,19 @@ impl<F: Function> Application for Body<F> {
             // A preset is about the position that this reply carries.
             self.raw = sample;
             self.take_over(out);
+            self.latch(sample, false, out);
+        }
+    }
+    fn transfer(&mut self, _now: Local, outputs: Option<&[u8]>, out: &mut Outbox) {
+        self.outputs = outputs.and_then(Outputs81::parse).unwrap_or_default();
+        // Once the clock is locked, T_O takes them over.
+        if !self.is_locked() {
+            self.take_over(out);
+        }
+    }
+    fn freeze(&mut self, _now: Local, sample: u32, out: &mut Outbox) {
+        // Once the clock is locked, what is held was latched at T_I.
+        if !self.is_locked() {
             self.latch(sample, false, out);
         }
     }
@@ -388,6 +451,12 @@ impl<F: Function> Application for Body<F> {
     }
     fn publishers(&self) -> u128 {
         self.function.publishers()
+    }
+    fn diagnosis(&self, diagnosis: &mut DiagBuffer) {
+        self.function.diagnosis(diagnosis);
+    }
+    fn diagnosis_revision(&self) -> u32 {
+        self.function.diagnosis_revision()
     }
 }
 
@@ -412,8 +481,10 @@ impl<F: Function> Station for Unit<F> {
             }
             Input::Telegram(heard) => self.slave.heard(now, heard, &mut self.body, out),
             Input::Deadline { timer: Timer::Watchdog, .. } => self.slave.watchdog(now, &mut self.body, out),
+            Input::Deadline { timer: Timer::Connection, .. } => self.slave.connection_due(now, &mut self.body, out),
             Input::Deadline { timer: Timer::Window, .. } => self.body.window_closed(now, out),
             Input::Deadline { timer: Timer::SetPoint, .. } => self.body.set_point(now, out),
+            Input::Deadline { timer: Timer::Links, .. } => self.body.function.monitor(now, out),
             Input::Sample(raw) if self.slave.state() == SlaveState::DataExch => self.body.latch(raw, true, out),
             Input::Deadline { .. } | Input::Sent | Input::Sample(_) => {}
             Input::Command(never) => match never {},

@@ -10,8 +10,16 @@
 //! | AwaitReady | diagnosis: fault of parameters or configuration | Diagnose |
 //! | AwaitReady | diagnosis: wants parameters | SetPrm |
 //! | AwaitReady | diagnosis: not ready, static diagnosis | AwaitReady |
+//! | DataExchange | inputs, DL | DataExchange |
+//! | DataExchange | inputs, DH | DataExchange, the diagnosis is due |
+//! | DataExchange | diagnosis: ready | DataExchange |
+//! | DataExchange | diagnosis: anything else | as from AwaitReady |
 //! | DataExchange | RS, or nothing for `lost_after` cycles | Diagnose |
 //! | any but DataExchange | nothing, or an answer that does not fit | Diagnose |
+//!
+//! A diagnosis that is due is read in the next cycle. Where Slave_Diag takes no longer than the slave's Data_Exchange it
+//! takes its place, so that T_DX holds; a slave whose diagnosis may be longer (Max_Diag_Data_Len) is read in the acyclic
+//! part and goes on exchanging data (Model: nothing in the isochronous part is longer than planned).
 //!
 //! Source: EN 50170-2; the order is that of an S7 master on the line.
 
@@ -21,8 +29,13 @@ use crate::dp::{CHK_CFG, GET_CFG, SET_PRM, SLAVE_DIAG};
 use crate::fdl::Outbox;
 use crate::fdl::active::Request;
 use crate::observation::{HandlerState, Observation};
+use crate::time::{Local, Span};
 use crate::wire::diag::{DiagStatus, Diagnosis};
 use crate::wire::{Address, Sap, Service, Status};
+
+/// Characters of a telegram around its data unit, with SAPs and without.
+pub(super) const SAP_FRAME_OCTETS: usize = 11;
+const FRAME_OCTETS: usize = 9;
 
 /// What the master knows of a slave before it sees it.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -43,6 +56,10 @@ pub struct SlaveParams {
     pub fail_safe: bool,
     /// Read the configuration back before parameterising.
     pub get_cfg: bool,
+    /// Max_Diag_Data_Len (octets), 6..=244.
+    pub max_diag: u8,
+    /// Min_Slave_Interval, from one request of Data_Exchange to the next.
+    pub min_interval: Span,
 }
 
 /// A change to a telegram of the start-up, for trying how a slave takes wrong ones.
@@ -114,13 +131,31 @@ pub struct Handler {
     missed: u16,
     /// Octets 1 to 3 of the diagnosis last reported.
     reported: Option<[u8; 3]>,
+    /// Length and first octets of the extended blocks last reported.
+    reported_blocks: (u8, [u8; 8]),
+    /// The slave asked for Slave_Diag with its last reply.
+    diagnosis_due: bool,
+    /// First bit of the last request of Data_Exchange, and end of its last good answer.
+    asked_at: Option<Local>,
+    exchanged_at: Option<Local>,
 }
 
 impl Handler {
     /// A handler that has not asked yet.
     pub fn new(params: SlaveParams) -> Self {
         let (prm, cfg) = (params.prm.clone(), params.cfg.clone());
-        Self { params, prm, cfg, state: HandlerState::Diagnose, missed: 0, reported: None }
+        Self {
+            params,
+            prm,
+            cfg,
+            state: HandlerState::Diagnose,
+            missed: 0,
+            reported: None,
+            reported_blocks: (0, [0; 8]),
+            diagnosis_due: false,
+            asked_at: None,
+            exchanged_at: None,
+        }
     }
     /// What the master knows beforehand.
     pub const fn params(&self) -> &SlaveParams {
@@ -134,12 +169,37 @@ impl Handler {
     pub fn exchanges(&self) -> bool {
         self.state == HandlerState::DataExchange
     }
+    /// Whether Slave_Diag takes the place of the next Data_Exchange.
+    pub fn diagnosis_in_place(&self) -> bool {
+        self.diagnosis_due && self.diagnosis_is_short()
+    }
+    /// Whether an acyclic service is due: one of the start-up, or Slave_Diag beside Data_Exchange.
+    pub fn has_service(&self) -> bool {
+        !self.exchanges() || (self.diagnosis_due && !self.diagnosis_is_short())
+    }
+    /// Whether Slave_Diag takes no longer than Data_Exchange, both frames together.
+    fn diagnosis_is_short(&self) -> bool {
+        let SlaveParams { outputs, inputs, max_diag, .. } = self.params;
+        2 * SAP_FRAME_OCTETS + usize::from(max_diag) <= 2 * FRAME_OCTETS + usize::from(outputs) + usize::from(inputs)
+    }
+    /// First instant at which Data_Exchange may be asked for again (Min_Slave_Interval).
+    pub fn earliest(&self) -> Option<Local> {
+        self.asked_at.map(|at| at + self.params.min_interval)
+    }
+    /// Data_Exchange is asked for, the first bit of the request at `at`.
+    pub fn asked(&mut self, at: Local) {
+        self.asked_at = Some(at);
+    }
+    /// When Data_Exchange was answered last as it should be.
+    pub const fn exchanged_at(&self) -> Option<Local> {
+        self.exchanged_at
+    }
 
-    /// The service that comes next in the start-up: its SAPs, data unit and the longest reply [octets of data].
+    /// The service that comes next in the start-up, Slave_Diag in data exchange: its SAPs, data unit and the longest reply [octets of data].
     pub fn service(&self) -> ((Sap, Sap), &[u8], usize) {
         match self.state {
             HandlerState::Diagnose | HandlerState::AwaitReady | HandlerState::DataExchange => {
-                (SLAVE_DIAG, &[], Diagnosis::LEN)
+                (SLAVE_DIAG, &[], self.params.max_diag.into())
             }
             HandlerState::GetCfg => (GET_CFG, &[], self.params.cfg.len()),
             HandlerState::SetPrm => (SET_PRM, &self.prm, 0),
@@ -166,31 +226,58 @@ impl Handler {
                     Some(status) => after_diagnosis(status),
                     None => HandlerState::Diagnose,
                 },
+                (HandlerState::DataExchange, Answer::Data(du)) => match self.diagnosis(du, out) {
+                    Some(status) => {
+                        (self.diagnosis_due, self.missed) = (false, 0);
+                        after_diagnosis(status)
+                    }
+                    None => HandlerState::Diagnose,
+                },
+                // It stays due.
+                (HandlerState::DataExchange, Answer::Nothing) => HandlerState::DataExchange,
                 (_, Answer::Nothing) => HandlerState::Diagnose,
                 _ => {
                     out.observe(Observation::IllegalAnswer { slave: self.params.address });
                     HandlerState::Diagnose
                 }
             };
+        let joined = next == HandlerState::DataExchange && !self.exchanges();
+        if self.exchanges() && next != HandlerState::DataExchange {
+            out.observe(Observation::Lost { slave: self.params.address });
+        }
         self.enter(next, out);
-        next == HandlerState::DataExchange
+        joined
     }
     fn diagnosis(&mut self, du: &[u8], out: &mut Outbox) -> Option<DiagStatus> {
         let diagnosis = Diagnosis::parse(du).ok()?;
+        out.observe(Observation::DiagnosisRead { slave: self.params.address });
         let [a, b, c, ..] = diagnosis.emit();
-        if self.reported != Some([a, b, c]) {
+        // During data exchange it is read because something changed.
+        if self.reported != Some([a, b, c]) || self.exchanges() {
             self.reported = Some([a, b, c]);
             out.observe(Observation::Diagnosis { slave: self.params.address, status: [a, b, c] });
+        }
+        let blocks = beginning(diagnosis.extended);
+        if self.reported_blocks != blocks || (self.exchanges() && blocks.0 > 0) {
+            self.reported_blocks = blocks;
+            let (length, first) = blocks;
+            out.observe(Observation::ExtendedDiagnosis { slave: self.params.address, length, first });
         }
         Some(diagnosis.status)
     }
 
-    /// Data_Exchange was answered as it should be.
-    pub fn exchanged(&mut self) {
+    /// Data_Exchange was answered as it should be, at `now`; `high` with high priority (DH).
+    pub fn exchanged(&mut self, now: Local, high: bool, out: &mut Outbox) {
         self.missed = 0;
+        self.exchanged_at = Some(now);
+        if high && !self.diagnosis_due {
+            self.diagnosis_due = true;
+            out.observe(Observation::DiagnosisDue { slave: self.params.address });
+        }
     }
     /// Data_Exchange was refused. Tells whether the slave was given up: always.
     pub fn refused(&mut self, out: &mut Outbox) -> bool {
+        out.observe(Observation::Lost { slave: self.params.address });
         self.enter(HandlerState::Diagnose, out);
         true
     }
@@ -215,14 +302,23 @@ impl Handler {
 
     fn enter(&mut self, state: HandlerState, out: &mut Outbox) {
         let from = core::mem::replace(&mut self.state, state);
-        self.missed = 0;
         if from != state {
+            (self.missed, self.diagnosis_due) = (0, false);
             out.observe(Observation::Handler { slave: self.params.address, from, to: state });
         }
     }
 }
 
-/// What follows from the diagnosis after Chk_Cfg.
+/// Length of extended blocks and their first octets.
+fn beginning(blocks: &[u8]) -> (u8, [u8; 8]) {
+    let mut first = [0; 8];
+    for (place, &octet) in first.iter_mut().zip(blocks) {
+        *place = octet;
+    }
+    (blocks.len() as u8, first)
+}
+
+/// What follows from the diagnosis after Chk_Cfg, and during data exchange.
 fn after_diagnosis(status: DiagStatus) -> HandlerState {
     if status.prm_fault() || status.cfg_fault() || status.not_supported() {
         HandlerState::Diagnose
@@ -251,6 +347,8 @@ mod tests {
             publisher: false,
             fail_safe: false,
             get_cfg,
+            max_diag: 6,
+            min_interval: Span::from_us(100),
         })
     }
     /// The handler after the answers of a start-up up to `state`.
@@ -292,12 +390,14 @@ mod tests {
             (SetPrm, [Diagnose, Diagnose, Diagnose, Diagnose, Diagnose, ChkCfg, Diagnose, Diagnose]),
             (ChkCfg, [Diagnose, Diagnose, Diagnose, Diagnose, Diagnose, AwaitReady, Diagnose, Diagnose]),
             (AwaitReady, [DataExchange, Diagnose, Diagnose, SetPrm, AwaitReady, Diagnose, Diagnose, Diagnose]),
+            (DataExchange, [DataExchange, Diagnose, Diagnose, SetPrm, AwaitReady, Diagnose, Diagnose, DataExchange]),
         ];
         for (state, row) in table {
             for (answer, next) in inputs.clone().zip(row) {
                 let mut handler = in_state(state);
                 let joined = handler.answered(answer, &mut Outbox::new());
-                assert_eq!((handler.state(), joined), (next, next == DataExchange), "{state} {answer:?}");
+                let joins = next == DataExchange && state != DataExchange;
+                assert_eq!((handler.state(), joined), (next, joins), "{state} {answer:?}");
             }
         }
     }
@@ -307,9 +407,92 @@ mod tests {
         let mut handler = in_state(HandlerState::DataExchange);
         let mut out = Outbox::new();
         assert!(!handler.missed(3, &mut out) && !handler.missed(3, &mut out));
-        handler.exchanged();
+        handler.exchanged(Local::ZERO, false, &mut out);
         assert!(!handler.missed(3, &mut out) && !handler.missed(3, &mut out) && handler.missed(3, &mut out));
         assert_eq!(handler.state(), HandlerState::Diagnose);
+    }
+
+    /// 2 x 11 + 6 octets against 2 x 9 + 16 of telegram 81.
+    #[test]
+    fn a_short_diagnosis_takes_the_place_of_data_exchange_and_a_long_one_the_acyclic_part() {
+        for (max_diag, in_place) in [(6, true), (12, true), (13, false), (244, false)] {
+            let mut handler = in_state(HandlerState::DataExchange);
+            handler.params.max_diag = max_diag;
+            let mut out = Outbox::new();
+            assert!(!handler.diagnosis_in_place() && !handler.has_service());
+            handler.exchanged(Local::ZERO, true, &mut out);
+            handler.exchanged(Local::ZERO, true, &mut out);
+            assert_eq!(out.observations().count(), 1, "due is said once");
+            assert_eq!((handler.diagnosis_in_place(), handler.has_service()), (in_place, !in_place));
+            handler.answered(Answer::Nothing, &mut out);
+            assert_eq!((handler.diagnosis_in_place(), handler.has_service()), (in_place, !in_place), "still due");
+            handler.answered(Answer::Data(&READY), &mut out);
+            assert!(!handler.diagnosis_in_place() && !handler.has_service());
+        }
+    }
+
+    #[test]
+    fn extended_blocks_are_reported_by_their_length_and_first_octets() {
+        let mut handler = in_state(HandlerState::DataExchange);
+        let mut diagnosis = READY.to_vec();
+        diagnosis.extend([0x0A, 0x83, 0, 0, 6, 1, 7, 1, 8, 0]);
+        let mut out = Outbox::new();
+        handler.answered(Answer::Data(&diagnosis), &mut out);
+        let slave = handler.params.address;
+        let first = [0x0A, 0x83, 0, 0, 6, 1, 7, 1];
+        let seen: Vec<_> = out.observations().copied().collect();
+        let status = [0x00, 0x0C, 0x00];
+        let expected = [
+            Observation::DiagnosisRead { slave },
+            Observation::Diagnosis { slave, status },
+            Observation::ExtendedDiagnosis { slave, length: 10, first },
+        ];
+        assert_eq!(seen, expected);
+        out.clear();
+        handler.answered(Answer::Data(&READY), &mut out);
+        let gone = Observation::ExtendedDiagnosis { slave, length: 0, first: [0; 8] };
+        assert_eq!(out.observations().last(), Some(&gone));
+    }
+
+    /// Every way out of data exchange that the master does not want, and one that it wants.
+    #[test]
+    fn lost_is_said_where_a_slave_leaves_against_the_masters_will() {
+        let losses = |leave: &dyn Fn(&mut Handler, &mut Outbox)| {
+            let (mut handler, mut out) = (in_state(HandlerState::DataExchange), Outbox::new());
+            leave(&mut handler, &mut out);
+            assert!(!handler.exchanges());
+            out.observations().filter(|what| matches!(what, Observation::Lost { .. })).count()
+        };
+        let not_ready = [0x02, 0x05, 0x00, 0xFF, 0x80, 0xF9];
+        assert_eq!(
+            losses(&|handler, out| {
+                handler.refused(out);
+            }),
+            1,
+            "RS"
+        );
+        assert_eq!(
+            losses(&|handler, out| {
+                handler.missed(1, out);
+            }),
+            1,
+            "silence"
+        );
+        assert_eq!(
+            losses(&|handler, out| {
+                handler.answered(Answer::Data(&not_ready), out);
+            }),
+            1,
+            "diagnosis"
+        );
+        assert_eq!(
+            losses(&|handler, out| {
+                handler.answered(Answer::Refused(Status::Rs), out);
+            }),
+            1,
+            "nonsense"
+        );
+        assert_eq!(losses(&|handler, out| handler.restart(out)), 0, "the master's own will");
     }
 
     #[test]

@@ -35,6 +35,18 @@ impl CycleClock {
     pub const fn new(t_dp: Span, t_gc: Span, rearm: Rearm, first: Local) -> Self {
         Self { t_dp, t_gc, rearm, cycle: 0, nominal: first, aim: first }
     }
+    /// Aims the coming cycle start at `first`; the numbers go on.
+    pub const fn restart(&mut self, first: Local) {
+        (self.nominal, self.aim) = (first, first);
+    }
+    /// Leaves out the cycles whose SYNCH should have left a whole T_DP and more before `now`: the grid goes on
+    /// (Model: D1), numbers count what is sent. Returns how many.
+    pub fn miss(&mut self, now: Local) -> u64 {
+        let missed = (now - self.planned()).div_floor(self.t_dp).max(0);
+        self.nominal += self.t_dp * missed;
+        self.aim += self.t_dp * missed;
+        missed as u64
+    }
     /// Number of the coming cycle.
     pub const fn coming(&self) -> u64 {
         self.cycle
@@ -68,6 +80,16 @@ mod tests {
             assert_eq!(clock.started(late), (0, Local::ZERO + Span::from_ms(2)));
             assert_eq!(clock.planned(), Local::ZERO + next - Span::from_us(10));
             assert_eq!(clock.coming(), 1);
+        }
+    }
+
+    #[test]
+    fn whole_cycles_without_token_are_left_out_and_the_grid_goes_on() {
+        let us = |us| Local::ZERO + Span::from_us(us);
+        for (back, missed, next) in [(1_500, 0, 2_000), (3_900, 0, 2_000), (3_990, 1, 4_000), (7_000, 2, 6_000)] {
+            let mut clock = CycleClock::new(Span::from_ms(2), Span::from_us(10), Rearm::Grid, us(2_000));
+            assert_eq!((clock.miss(us(back)), clock.planned()), (missed, us(next - 10)), "token back at {back} us");
+            assert_eq!(clock.started(us(next)), (0, us(next)), "numbers count what is sent");
         }
     }
 }

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The acyclic message is one service for a slave that starts up, or one of the acyclic job; where the mode has to be
-//! told, a Global_Control comes before it. A slave that gets on is served until it exchanges data, then the next one: from Set_Prm on its watchdog
+//! told or Sync and Freeze were ordered, Global_Controls come before it. A slave that gets on is served until it exchanges data, then the next one: from Set_Prm on its watchdog
 //! runs, and a cycle has time for one service only.
 //!
 //! | part | ends with | next part |
@@ -17,33 +17,46 @@
 //! | Spare | `Schedule` due | Clock: SYNCH on its way |
 //! | Clock | its last bit has left | Exchange with the first slave |
 //! | Exchange | answer or none after the repeats | Exchange with the next slave; after the last Control, Startup or Acyclic |
-//! | Control | end of the Global_Control | Startup or Acyclic |
+//! | Control | end of the Global_Control | another Control, Startup or Acyclic |
 //! | Startup, Acyclic | answer or none | Gap |
-//! | Gap | answer or none | Spare, the token sent; Token where the spare time is active |
+//! | Gap | answer or none | alone: Spare, the token sent; Token where the spare time is active; in a ring: Away |
 //! | Token | `Schedule` due | Token, another token sent, while one fits; then Spare |
+//! | Away | token held | Alive, or Spare where SYNCH is near; free-running: Clock, or Exchange where it stopped |
+//! | Spare | others could claim the token before SYNCH | Silence |
+//! | Silence | `Schedule` due | Alive: an FDL status request on its way |
+//! | Alive | answer or none | Spare |
+//! | any with the token | token gone | Away |
+//!
+//! A free-running master has no SYNCH: its Clock ends with the first bit of a poll cycle, see `master/cycle.rs`.
+//!
+//! Where a slave's diagnosis is due, Slave_Diag takes the place of its Data_Exchange, or is the acyclic message; see
+//! [`handler`](crate::dp::handler). When the mode changes without an order says
+//! [`supervision`](crate::dp::supervision).
 //!
 //! A part that has nothing to do, or whose longest course would not end before the next SYNCH, is left out.
 
+mod cycle;
+
 use alloc::vec::Vec;
 
-use crate::dp::GLOBAL_CONTROL;
-use crate::dp::handler::{Answer, Handler, Patch, SlaveParams, StartupTelegram};
+pub use cycle::Pace;
+use cycle::Polling;
+
+use crate::dp::handler::{Answer, Handler, Patch, SAP_FRAME_OCTETS, SlaveParams, StartupTelegram};
 use crate::dp::iso::{CycleClock, Rearm};
-use crate::dp::ms1::{Client, Failure, Job, MS1, Progress};
+use crate::dp::ms1::{self, Client, Failure, Job, MS1, Progress};
+use crate::dp::supervision::Supervision;
+use crate::dp::{GLOBAL_CONTROL, SLAVE_DIAG};
 use crate::fdl::active::{Active, Confirm, Request};
 use crate::fdl::params::BusParams;
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
-use crate::observation::{MasterMode, Observation};
+use crate::observation::{HandlerState, MasterClass, MasterMode, Observation};
 use crate::time::{Local, Span};
 use crate::wire::control::GlobalControl;
 use crate::wire::{Address, Service, Status};
 
-/// C1_Response_Timeout (SIEM80F9.GSE).
-const C1_RESPONSE_TIMEOUT: Span = Span::from_s(10);
 /// Characters of a Global_Control telegram.
 const GC_OCTETS: usize = 13;
-/// Characters of a telegram around its data unit, with and without SAPs.
-const SAP_FRAME_OCTETS: usize = 11;
 /// Characters of an FDL status request and its answer.
 const STATUS_OCTETS: usize = 6;
 
@@ -76,6 +89,8 @@ pub enum Order<C> {
     Mode(MasterMode),
     /// A slave is started anew, with this telegram changed.
     Patch(Address, StartupTelegram, Patch),
+    /// Sync, Freeze and their ends, for these groups. Whether it is Clear or Operate, the master adds.
+    Control(GlobalControl),
     /// Something for its application.
     Application(C),
 }
@@ -87,8 +102,12 @@ pub struct Settings {
     pub address: Address,
     /// Bus parameters.
     pub bus: BusParams,
-    /// T_DP.
+    /// T_DP; of a free-running master the cycle time that is planned.
     pub t_dp: Span,
+    /// Whether cycles begin with SYNCH.
+    pub pace: Pace,
+    /// Other active stations belong to this bus, in the ring or not yet: silence is never as long as their T_TO.
+    pub shared: bool,
     /// How the next cycle start is found.
     pub rearm: Rearm,
     /// Repeats of an unanswered Data_Exchange (Model: D7).
@@ -101,6 +120,10 @@ pub struct Settings {
     pub active_spare: bool,
     /// Data_Control_Time; the mode is told to the slaves at least every third of it (Model: D5).
     pub data_control_time: Span,
+    /// C1_Response_Timeout, after which an acyclic job is given up; the GSD file counts it in 10 ms.
+    pub ms1_timeout: Span,
+    /// Error_Action_Flag: back to Clear when a slave misses Data_Exchange for Data_Control_Time.
+    pub auto_clear: bool,
     /// The slaves, in the order in which they are polled.
     pub slaves: Vec<SlaveParams>,
 }
@@ -121,6 +144,12 @@ enum Part {
     Gap(Address),
     /// A further token in active spare time.
     Token,
+    /// The token is elsewhere.
+    Away,
+    /// The token is held in silence, a poll is scheduled.
+    Silence,
+    /// A poll of this address, to be heard.
+    Alive(Address),
 }
 
 /// A class 1 master.
@@ -144,9 +173,15 @@ pub struct Master<A> {
     /// Cycle in which it was told last, and after how many it is told again.
     control_told: u64,
     control_every: u64,
+    /// Commands that were ordered and not sent yet, the first one first.
+    commands: Vec<GlobalControl>,
+    supervision: Supervision,
     /// Where the search for the next slave in start-up begins.
     startup_next: usize,
     ms1: Client,
+    /// Number of the first cycle since power on.
+    begun: u64,
+    polling: Polling,
 }
 
 impl<A: Application> Master<A> {
@@ -169,8 +204,12 @@ impl<A: Application> Master<A> {
             control_told: 0,
             // Never in every cycle: slaves start up in the acyclic part too.
             control_every: third.div_floor(settings.t_dp).max(2) as u64,
+            commands: Vec::new(),
+            supervision: Supervision::new(settings.auto_clear, settings.data_control_time, settings.clear_for),
             startup_next: 0,
-            ms1: Client::new(C1_RESPONSE_TIMEOUT),
+            ms1: Client::new(settings.ms1_timeout),
+            begun: 0,
+            polling: Polling::new(),
             settings,
         }
     }
@@ -196,9 +235,17 @@ impl<A: Application> Master<A> {
     }
 
     fn power_on(&mut self, now: Local, out: &mut Outbox) {
-        for handler in &mut self.handlers {
-            handler.restart(out);
+        // What it knew of its slaves is gone, and so is its application's cycle with them.
+        for slave in 0..self.handlers.len() {
+            if self.handlers[slave].exchanges() {
+                self.app.joined(slave, false, out);
+            }
+            self.handlers[slave].restart(out);
+            self.give_up_job(slave, out);
         }
+        self.commands.clear();
+        self.supervision.restart();
+        (self.control_due, self.control_told, self.startup_next) = (true, 0, 0);
         self.active = Active::new(self.settings.address, self.settings.bus);
         self.part = Part::Starting;
         self.set_mode(MasterMode::Offline, out);
@@ -208,7 +255,8 @@ impl<A: Application> Master<A> {
     fn confirmed(&mut self, now: Local, confirm: Confirm<'_>, out: &mut Outbox) {
         match (self.part, confirm) {
             (_, Confirm::Nothing) => {}
-            (Part::Starting, Confirm::TokenHeld) => self.begin(now, out),
+            (_, Confirm::TokenHeld) => self.token_held(now, out),
+            (_, Confirm::TokenGone) => self.token_gone(out),
             (Part::Exchange(slave), confirm) => {
                 self.exchange_answered(now, slave, confirm, out);
                 self.exchange(now, slave + 1, out);
@@ -225,28 +273,21 @@ impl<A: Application> Master<A> {
                 out.observe(Observation::Gap { address, answer });
                 self.token(out);
             }
+            (Part::Alive(address), Confirm::Gap(answer)) => {
+                out.observe(Observation::Gap { address, answer });
+                self.spare(now, out);
+            }
             (part, confirm) => unreachable!("{confirm:?} during {part:?}: the active station answers requests only"),
         }
-    }
-
-    /// The token is held: the slaves are started up in Clear, the clock starts one T_DP from here.
-    fn begin(&mut self, now: Local, out: &mut Outbox) {
-        let t_gc = self.settings.bus.rate.octets(GC_OCTETS);
-        self.clock = CycleClock::new(self.settings.t_dp, t_gc, self.settings.rearm, now + self.settings.t_dp);
-        self.set_mode(MasterMode::Clear, out);
-        self.spare(now, out);
-    }
-
-    fn spare(&mut self, from: Local, out: &mut Outbox) {
-        self.part = Part::Spare;
-        out.arm(Timer::Schedule, from);
     }
 
     /// `Schedule` came due.
     fn scheduled(&mut self, now: Local, out: &mut Outbox) {
         match self.part {
-            Part::Spare => self.synch(now, out),
-            Part::Control => self.message(now, out),
+            Part::Spare if self.settings.pace == Pace::Synch => self.synch(now, out),
+            Part::Spare => self.visit(now, out),
+            Part::Silence => self.be_heard(now, out),
+            Part::Control => self.acyclic(now, out),
             Part::Token => self.further_token(now, out),
             _ => {}
         }
@@ -263,18 +304,19 @@ impl<A: Application> Master<A> {
         self.part = Part::Clock;
     }
 
-    /// The last bit of SYNCH left at `now`: a cycle begins.
+    /// The last bit of SYNCH left at `now`, or the first bit of a free-running master's cycle does: it begins.
     fn clock_sent(&mut self, now: Local, out: &mut Outbox) {
-        self.active.clock_sent(now);
-        let (cycle, nominal) = self.clock.started(now);
+        let (cycle, nominal) = self.started(now);
         self.t0 = now;
         self.exchange_end = now;
         self.exchanged = false;
         self.retries = 0;
         out.observe(Observation::CycleStart { cycle, nominal });
-        if self.mode == MasterMode::Clear && cycle == self.settings.clear_for {
-            self.set_mode(MasterMode::Operate, out);
+        let (mode, to_blame) = self.supervision.cycle(now, cycle - self.begun, self.mode, &self.handlers);
+        if let Some(slave) = to_blame {
+            out.observe(Observation::AutoClear { slave: self.handlers[slave].params().address });
         }
+        self.set_mode(mode, out);
         self.app.cycle(cycle, self.mode, out);
         self.exchange(now, 0, out);
     }
@@ -284,12 +326,22 @@ impl<A: Application> Master<A> {
         let Some(slave) = (from..self.handlers.len()).find(|&slave| self.handlers[slave].exchanges()) else {
             return self.exchange_done(out);
         };
+        if self.stops_before(slave, now, out) {
+            return;
+        }
         self.exchanged = true;
         self.part = Part::Exchange(slave);
+        let handler = &mut self.handlers[slave];
+        let free = self.active.free_at().max(now);
+        let at = handler.earliest().map_or(free, |earliest| earliest.max(free));
+        handler.asked(at);
         let handler = &self.handlers[slave];
         let request = handler.exchange(self.settings.dx_retries);
+        if handler.diagnosis_in_place() {
+            let request = Request { service: Service::SrdHigh, saps: Some(SLAVE_DIAG), ..request };
+            return self.active.request(at, &request, 0, out, |_| ());
+        }
         let params = handler.params();
-        let at = self.active.free_at().max(now);
         let app = &mut self.app;
         match self.mode {
             MasterMode::Operate => {
@@ -304,12 +356,16 @@ impl<A: Application> Master<A> {
         let handler = &mut self.handlers[slave];
         let expected = usize::from(handler.params().inputs);
         let lost = match confirm {
-            Confirm::Reply { status: Status::Dl | Status::Dh, du } if du.len() == expected => {
-                handler.exchanged();
+            Confirm::Reply { status: Status::Dl | Status::Dh, du } if handler.diagnosis_in_place() => {
+                handler.answered(Answer::Data(du), out);
+                !handler.exchanges()
+            }
+            Confirm::Reply { status: status @ (Status::Dl | Status::Dh), du } if du.len() == expected => {
+                handler.exchanged(now, status == Status::Dh, out);
                 self.app.inputs(slave, Some(du), out);
                 return;
             }
-            Confirm::Acknowledged if expected == 0 => return handler.exchanged(),
+            Confirm::Acknowledged if expected == 0 => return handler.exchanged(now, false, out),
             Confirm::NoReply => handler.missed(self.settings.lost_after, out),
             Confirm::Reply { status: Status::Rs, .. } => handler.refused(out),
             _ => {
@@ -329,26 +385,30 @@ impl<A: Application> Master<A> {
         self.acyclic(self.exchange_end, out);
     }
 
-    /// Whether something that keeps the bus busy for `span` ends early enough for the next SYNCH.
-    fn fits(&self, span: Span) -> bool {
-        self.active.free_at() + span + self.active.t_id1() <= self.clock.planned()
-    }
-
-    /// The acyclic part of this cycle: the mode if it is due, then one message (Model: D6).
+    /// The acyclic part of this cycle: the mode if it is due, commands, then one message (Model: D6).
     fn acyclic(&mut self, now: Local, out: &mut Outbox) {
         let since = self.clock.coming().saturating_sub(self.control_told);
         let control = self.control_due || since >= self.control_every;
         let rate = self.settings.bus.rate;
-        if control && self.fits(rate.octets(GC_OCTETS) + self.settings.bus.span(self.settings.bus.t_id2())) {
-            return self.tell_mode(out);
+        let fits = (control || !self.commands.is_empty())
+            && self.fits(rate.octets(GC_OCTETS) + self.settings.bus.span(self.settings.bus.t_id2()));
+        match self.commands.first() {
+            _ if !fits => self.message(now, out),
+            _ if control => self.tell_mode(out),
+            Some(&command) => self.tell(command, out),
+            None => self.message(now, out),
         }
-        self.message(now, out);
     }
     /// The one acyclic message: a slave's start-up and the acyclic job in turn; then the GAP.
     fn message(&mut self, now: Local, out: &mut Outbox) {
         let count = self.handlers.len();
         let mut slaves = (0..count).map(|i| (self.startup_next + i) % count);
-        let starting = slaves.find(|&slave| !self.handlers[slave].exchanges());
+        let starting = slaves.find(|&slave| self.handlers[slave].has_service());
+        // Also where the cycle had no time to ask.
+        let since = self.ms1.since().unwrap_or(now);
+        if let Some(slave) = self.ms1.overdue(now) {
+            self.acyclic_done((now - since, slave), Err(Failure::Timeout), out);
+        }
         if self.ms1.is_idle()
             && let Some(job) = self.app.acyclic()
         {
@@ -361,7 +421,7 @@ impl<A: Application> Master<A> {
         }
     }
     fn acyclic_message(&mut self, out: &mut Outbox) {
-        let Some((slave, du)) = self.ms1.next() else { return self.gap(out) };
+        let Some((slave, du)) = self.ms1.next().filter(|_| self.may_low()) else { return self.gap(out) };
         let longest = SAP_FRAME_OCTETS + self.ms1.longest_answer();
         let Some(retries) = self.retries_that_fit(SAP_FRAME_OCTETS + du.len(), longest) else {
             return self.gap(out);
@@ -378,11 +438,18 @@ impl<A: Application> Master<A> {
             Confirm::Reply { status, .. } => Err(Some(status)),
             _ => Err(None),
         };
+        let since = self.ms1.since().unwrap_or(now);
         match self.ms1.answered(now, answer) {
             Progress::Going => {}
-            Progress::Done { slave, pdu } => self.app.acyclic_done(slave, Ok(pdu), out),
-            Progress::Failed { slave, why } => self.app.acyclic_done(slave, Err(why), out),
+            Progress::Done { slave, pdu } => self.acyclic_done((now - since, slave), Ok(pdu), out),
+            Progress::Failed { slave, why } => self.acyclic_done((now - since, slave), Err(why), out),
         }
+    }
+    /// An acyclic job is over after `took`.
+    fn acyclic_done(&mut self, (took, slave): (Span, usize), answer: Result<&[u8], Failure>, out: &mut Outbox) {
+        let (address, class) = (self.handlers[slave].params().address, MasterClass::One);
+        out.observe(Observation::AcyclicDone { slave: address, class, result: ms1::result(answer), took });
+        self.app.acyclic_done(slave, answer, out);
     }
     /// How often a request of `octets` characters with an answer of up to `reply` may be repeated before the next
     /// SYNCH; none if it does not fit once.
@@ -393,13 +460,23 @@ impl<A: Application> Master<A> {
         self.fits(once).then_some(if self.fits(all) { limit } else { 0 })
     }
     fn tell_mode(&mut self, out: &mut Outbox) {
-        let control = if self.mode == MasterMode::Operate { GlobalControl::OPERATE } else { GlobalControl::CLEAR };
         self.control_due = false;
         self.control_told = self.clock.coming();
-        let end =
-            self.active.broadcast(self.active.free_at(), Address::BROADCAST, GLOBAL_CONTROL, &control.emit(), out);
+        self.control(GlobalControl::OPERATE, out);
+    }
+    /// The command that was ordered first.
+    fn tell(&mut self, command: GlobalControl, out: &mut Outbox) {
+        self.commands.remove(0);
+        let octets = self.control(command, out);
+        out.observe(Observation::Control { octets });
+    }
+    /// Sends a Global_Control, which always says Clear or Operate too.
+    fn control(&mut self, control: GlobalControl, out: &mut Outbox) -> [u8; GlobalControl::LEN] {
+        let octets = GlobalControl { clear: self.mode != MasterMode::Operate, ..control }.emit();
+        let end = self.active.broadcast(self.active.free_at(), Address::BROADCAST, GLOBAL_CONTROL, &octets, out);
         self.part = Part::Control;
         out.arm(Timer::Schedule, end);
+        octets
     }
     fn startup(&mut self, slave: usize, out: &mut Outbox) {
         let handler = &self.handlers[slave];
@@ -424,6 +501,8 @@ impl<A: Application> Master<A> {
             self.app.joined(slave, true, out);
             // The newcomer has not heard the mode yet.
             self.control_due = true;
+        } else if before == HandlerState::DataExchange && !handler.exchanges() {
+            self.left(slave, out);
         }
         let gets_on = self.handlers[slave].state() > before;
         self.startup_next = if gets_on { slave } else { slave + 1 };
@@ -441,43 +520,13 @@ impl<A: Application> Master<A> {
     /// A slave is not in data exchange any more.
     fn left(&mut self, slave: usize, out: &mut Outbox) {
         self.app.joined(slave, false, out);
+        self.give_up_job(slave, out);
+    }
+    fn give_up_job(&mut self, slave: usize, out: &mut Outbox) {
+        let since = self.ms1.since();
         if self.ms1.left(slave) {
-            self.app.acyclic_done(slave, Err(Failure::Left), out);
-        }
-    }
-
-    fn gap(&mut self, out: &mut Outbox) {
-        let due = self.clock.coming().is_multiple_of(self.settings.bus.gap_factor.into());
-        if due && self.fits(self.active.longest_cycle(STATUS_OCTETS, STATUS_OCTETS)) {
-            let address = self.active.poll_gap(self.active.free_at(), out);
-            self.part = Part::Gap(address);
-        } else {
-            self.token(out);
-        }
-    }
-    fn token(&mut self, out: &mut Outbox) {
-        let free = self.active.free_at();
-        let end = if self.fits(self.settings.bus.rate.octets(3)) { self.active.pass_token(free, out) } else { free };
-        out.observe(Observation::CycleSpare {
-            acyclic: end - self.exchange_end,
-            spare: (self.clock.planned() - end).max(Span::ZERO),
-        });
-        self.idle(end, out);
-    }
-    /// The cycle's work ends at `end`: silence, or further tokens (Model: D6).
-    fn idle(&mut self, end: Local, out: &mut Outbox) {
-        if !self.settings.active_spare {
-            return self.spare(end, out);
-        }
-        self.part = Part::Token;
-        out.arm(Timer::Schedule, end);
-    }
-    fn further_token(&mut self, now: Local, out: &mut Outbox) {
-        if self.fits(self.settings.bus.rate.octets(3)) {
-            let end = self.active.pass_token(self.active.free_at(), out);
-            self.idle(end, out);
-        } else {
-            self.spare(now, out);
+            let took = since.map_or(Span::ZERO, |since| (self.exchange_end - since).max(Span::ZERO));
+            self.acyclic_done((took, slave), Err(Failure::Left), out);
         }
     }
 }
@@ -499,15 +548,22 @@ impl<A: Application> Station for Master<A> {
                 self.count_retry(out);
                 self.confirmed(now, confirm, out);
             }
-            Input::Sent => self.clock_sent(now, out),
+            Input::Sent if self.part == Part::Clock => self.clock_sent(now, out),
             Input::Deadline { timer: Timer::Slot, busy } => {
                 let confirm = self.active.slot_over(now, busy, out);
                 self.count_retry(out);
                 self.confirmed(now, confirm, out);
             }
             Input::Deadline { timer: Timer::Schedule, .. } => self.scheduled(now, out),
-            Input::Command(Order::Mode(mode)) if self.mode >= MasterMode::Clear => self.set_mode(mode, out),
-            Input::Deadline { .. } | Input::Sample(_) | Input::Command(Order::Mode(_)) => {}
+            Input::Command(Order::Mode(mode)) if self.mode >= MasterMode::Clear => {
+                self.supervision.ordered();
+                self.set_mode(mode, out);
+            }
+            Input::Command(Order::Control(control)) if self.mode >= MasterMode::Clear => self.commands.push(control),
+            Input::Sent
+            | Input::Deadline { .. }
+            | Input::Sample(_)
+            | Input::Command(Order::Mode(_) | Order::Control(_)) => {}
             Input::Command(Order::Patch(slave, telegram, patch)) => self.patch(slave, telegram, &patch, out),
             Input::Command(Order::Application(command)) => self.app.command(command, out),
         }

@@ -14,31 +14,39 @@
 //! | DATA_EXCH | good Chk_Cfg | DATA_EXCH | SC |
 //! | DATA_EXCH | bad Chk_Cfg | WAIT_PRM, Cfg_Fault | SC |
 //! | DATA_EXCH | Data_Exchange, RD_Inp, RD_Outp | DATA_EXCH | data |
+//! | DATA_EXCH | Data_Exchange after a change of the diagnosis that its master has not read | DATA_EXCH | data, DH |
 //! | DATA_EXCH | Data_Exchange of another length | WAIT_PRM | RS |
 //! | DATA_EXCH | Data_Exchange by MSRD without Publisher_Enable | DATA_EXCH | RS |
 //! | DATA_EXCH | MS1 with DPV1_Enable | DATA_EXCH | see [`ms1`](crate::dp::ms1) |
 //! | any but POWER_ON | Slave_Diag, Get_Cfg | unchanged | data |
+//! | any but POWER_ON | MS2 of any master | unchanged | see [`ms2`] |
 //! | any | Set_Prm with neither Lock nor Unlock | unchanged, min T_SDR in force | SC |
 //! | WAIT_CFG, DATA_EXCH | Set_Prm, Chk_Cfg, Data_Exchange of another master | unchanged | RS |
 //!
-//! Source: EN 50170-2. The slave belongs to one device, whose own rules come in through [`Application`].
+//! Source: EN 50170-2. The slave belongs to one device, whose own rules come in through [`Application`]. A
+//! Global_Control of its own master acts in DATA_EXCH: the clock on all, Operate, Clear, Sync and Freeze where the
+//! slave's group is selected; what the last two do to data says [`image`](crate::dp::image). Model: a change of
+//! Sync_Mode or Freeze_Mode is a change of the diagnosis like any other.
 
+use alloc::borrow::Cow;
 use core::fmt;
 
-use crate::dp::ms1::{Answer, Records, Server};
+use crate::dp::image::Image;
+use crate::dp::ms1::{Access, Answer, Records, Server};
+use crate::dp::ms2::{self, Manager, Message};
 use crate::fdl::passive::{Indication, Passive};
 use crate::fdl::{Filter, Heard, Outbox, Timer};
 use crate::observation::{Observation, SlaveCause, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::control::GlobalControl;
-use crate::wire::diag::{DiagStatus, Diagnosis};
+use crate::wire::diag::{DiagBuffer, DiagStatus, Diagnosis};
 use crate::wire::prm::{PrmError, SetPrm};
 use crate::wire::{Address, FrameControl, Header, Sap, Service, Status};
 
 /// Time from an acyclic request to its answer. Model: none of the sources has a number.
-const ACYCLIC_TIME: Span = Span::from_ms(2);
-/// Most output octets of a slave.
-const MAX_OUTPUTS: usize = 244;
+pub const ACYCLIC_TIME: Span = Span::from_ms(2);
+/// C1_Max_Data_Len of the encoders (octets).
+const C1_MAX_DATA: u8 = 240;
 
 /// Why a slave does not take its parameters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -84,8 +92,13 @@ pub trait Application: Records {
     fn enter(&mut self, now: Local, out: &mut Outbox);
     /// Data exchange is over: watchdog, new parameters, unlock, fault.
     fn leave(&mut self, now: Local, out: &mut Outbox);
-    /// New outputs, or none while the master is in Clear. `sample` is the raw position at the request.
+    /// A Data_Exchange came. `outputs` are those in force from now on: what it brought, or in Sync mode what the last
+    /// Sync did; none while the master is in Clear. `sample` is the raw position at the request.
     fn outputs(&mut self, now: Local, outputs: Option<&[u8]>, sample: u32, out: &mut Outbox);
+    /// Sync, Unsync or Clear_Data put these outputs in force, none after Clear_Data.
+    fn transfer(&mut self, now: Local, outputs: Option<&[u8]>, out: &mut Outbox);
+    /// Freeze is about to hold the inputs. `sample` is the raw position at this instant.
+    fn freeze(&mut self, now: Local, sample: u32, out: &mut Outbox);
     /// Writes the inputs of the reply.
     fn inputs(&self, du: &mut [u8]);
     /// The clock telegram SYNCH arrived during data exchange.
@@ -96,17 +109,25 @@ pub trait Application: Records {
     fn published(&mut self, now: Local, publisher: Address, du: &[u8], out: &mut Outbox);
     /// Publishers to listen to: bit n is address n.
     fn publishers(&self) -> u128;
+    /// Writes the device's own part of the diagnosis: extended blocks, Ext_Diag, Stat_Diag.
+    fn diagnosis(&self, _diagnosis: &mut DiagBuffer) {}
+    /// Another number than before whenever [`diagnosis`](Self::diagnosis) writes something else: the replies to
+    /// Data_Exchange are then of high priority until the master has read it.
+    fn diagnosis_revision(&self) -> u32 {
+        0
+    }
 }
 
 /// What a slave is, for good.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
+#[allow(clippy::struct_excessive_bools)] // What a GSD file says with four keys.
 pub struct Identity {
     /// Station address.
     pub address: Address,
     /// Ident_Number.
     pub ident: u16,
     /// The one configuration it accepts, as in Chk_Cfg.
-    pub config: &'static [u8],
+    pub config: Cow<'static, [u8]>,
     /// Output octets (from the master).
     pub outputs: u8,
     /// Input octets (to the master).
@@ -115,10 +136,18 @@ pub struct Identity {
     pub fail_safe: bool,
     /// Answers MSRD to everybody if so parameterised.
     pub publisher: bool,
+    /// Takes Sync_Req.
+    pub sync: bool,
+    /// Takes Freeze_Req.
+    pub freeze: bool,
+    /// Max_Diag_Data_Len (octets), 6..=244.
+    pub max_diag: u8,
     /// Bit rate of the bus.
     pub rate: BitRate,
     /// Own T_SDR.
     pub t_sdr: Tbit,
+    /// Its connections for class 2 masters.
+    pub ms2: ms2::Settings,
 }
 
 /// A request to execute.
@@ -147,7 +176,19 @@ pub struct Slave {
     /// DPV1_Enable: MS1 is open.
     dpv1: bool,
     ms1: Server,
-    outputs: [u8; MAX_OUTPUTS],
+    ms2: Manager,
+    image: Image,
+    /// The diagnosis that its master knows: as it read it last, or as data exchange began.
+    known: Known,
+}
+
+/// What can change in a diagnosis during data exchange.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+struct Known {
+    /// Sync_Mode and Freeze_Mode.
+    modes: DiagStatus,
+    /// [`Application::diagnosis_revision`].
+    device: u32,
 }
 
 impl Slave {
@@ -155,6 +196,8 @@ impl Slave {
     pub fn new(identity: Identity) -> Self {
         Self {
             passive: Passive::new(identity.address, identity.rate, identity.t_sdr),
+            image: Image::new(identity.outputs, identity.inputs),
+            ms2: Manager::new(identity.ms2),
             identity,
             state: SlaveState::PowerOn,
             master: None,
@@ -164,8 +207,8 @@ impl Slave {
             fail_safe: false,
             publisher: false,
             dpv1: false,
-            ms1: Server::new(ACYCLIC_TIME),
-            outputs: [0; MAX_OUTPUTS],
+            ms1: Server::new(ACYCLIC_TIME, C1_MAX_DATA),
+            known: Known::default(),
         }
     }
     /// What it is.
@@ -182,12 +225,17 @@ impl Slave {
     }
     /// Which telegrams it wants.
     pub fn filter(&self, app: &impl Application) -> Filter {
-        Filter { all: false, own: self.identity.address, publishers: app.publishers() }
+        // Without parameters there are no links.
+        let listens = matches!(self.state, SlaveState::WaitCfg | SlaveState::DataExch);
+        Filter { all: false, own: self.identity.address, publishers: if listens { app.publishers() } else { 0 } }
     }
 
     /// The supply came on: everything from before is forgotten, initialisation takes no time.
     pub fn power_on(&mut self, now: Local, app: &mut impl Application, out: &mut Outbox) {
-        *self = Self::new(self.identity);
+        *self = Self::new(self.identity.clone());
+        for connection in 0..self.identity.ms2.connections {
+            app.closed(Access::Ms2(connection));
+        }
         self.enter(SlaveState::WaitPrm, SlaveCause::Initialised, now, app, out);
     }
     /// [`Timer::Watchdog`] came due.
@@ -208,7 +256,9 @@ impl Slave {
                 let request = Arrived { now, header, du, sample: heard.sample };
                 self.request(&request, app, out);
             }
-            Indication::Broadcast { header, du } => self.broadcast(now, &header, du, app, out),
+            Indication::Broadcast { header, du } => {
+                self.broadcast(&Arrived { now, header, du, sample: heard.sample }, app, out);
+            }
             Indication::Published { publisher, du } => app.published(now, publisher, du, out),
         }
     }
@@ -222,21 +272,25 @@ impl Slave {
         let &Arrived { now, header, du, .. } = request;
         match (header.dsap, header.ssap) {
             (None, None) => self.data_exchange(request, app, out),
-            (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, out),
+            (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, header.sa, app, out),
             (Some(Sap::GET_CFG), Some(Sap::MASTER_MS0)) => {
-                let config = self.identity.config;
+                let config = &self.identity.config;
                 self.passive.reply(now, Status::Dl, config.len(), out, |du| du.copy_from_slice(config));
             }
             (Some(Sap::SET_PRM), Some(Sap::MASTER_MS0)) => self.set_prm(now, header.sa, du, app, out),
             (Some(Sap::CHK_CFG), Some(Sap::MASTER_MS0)) => self.chk_cfg(now, header.sa, du, app, out),
             (Some(Sap::RD_INP), Some(Sap::MASTER_MS0)) if self.state == SlaveState::DataExch => {
-                self.passive.reply(now, Status::Dl, self.identity.inputs.into(), out, |du| app.inputs(du));
+                self.reply_inputs(now, Status::Dl, app, out);
             }
             (Some(Sap::RD_OUTP), Some(Sap::MASTER_MS0)) if self.state == SlaveState::DataExch => {
-                let outputs = &self.outputs[..self.identity.outputs.into()];
+                let outputs = self.image.octets();
                 self.passive.reply(now, Status::Dl, outputs.len(), out, |du| du.copy_from_slice(outputs));
             }
             (Some(Sap::MS1), Some(Sap::MASTER_MS1)) => self.ms1(request, app, out),
+            (Some(dsap), Some(ssap)) if self.ms2.has(dsap) => {
+                let message = Message { master: header.sa, ssap, dsap, du };
+                self.ms2(now, &message, app, out);
+            }
             _ => self.refuse(now, out),
         }
     }
@@ -245,10 +299,21 @@ impl Slave {
         if self.state != SlaveState::DataExch || !self.dpv1 || self.is_foreign(header.sa) {
             return self.refuse(now, out);
         }
-        match self.ms1.heard(now, du, app) {
-            Answer::Acknowledge => self.passive.acknowledge(now, out),
-            Answer::Data(pdu) => self.passive.reply(now, Status::Dl, pdu.len(), out, |du| du.copy_from_slice(pdu)),
-            Answer::Refuse(status) => self.passive.reply(now, status, 0, out, |_| ()),
+        answer(&mut self.passive, now, self.ms1.heard(now, du, app), out);
+    }
+    fn ms2(&mut self, now: Local, message: &Message<'_>, app: &mut impl Application, out: &mut Outbox) {
+        answer(&mut self.passive, now, self.ms2.heard(now, message, app, out), out);
+        self.supervise(out);
+    }
+    /// [`Timer::Connection`] came due.
+    pub fn connection_due(&mut self, now: Local, app: &mut impl Application, out: &mut Outbox) {
+        self.ms2.due(now, app, out);
+        self.supervise(out);
+    }
+    fn supervise(&self, out: &mut Outbox) {
+        match self.ms2.deadline() {
+            Some(deadline) => out.arm(Timer::Connection, deadline),
+            None => out.disarm(Timer::Connection),
         }
     }
     fn refuse(&mut self, now: Local, out: &mut Outbox) {
@@ -269,32 +334,50 @@ impl Slave {
         match du.len() {
             // A fail-safe slave takes an empty request for Clear.
             0 if self.fail_safe && expected > 0 => {
-                self.outputs = [0; MAX_OUTPUTS];
-                app.outputs(now, None, sample, out);
+                self.image.clear();
             }
-            len if len == expected => {
-                self.outputs[..len].copy_from_slice(du);
-                app.outputs(now, Some(du), sample, out);
-            }
+            len if len == expected => self.image.exchange(du),
             _ => {
                 self.refuse(now, out);
                 return self.unlock(SlaveCause::OutputLength, now, app, out);
             }
         }
-        self.passive.reply(now, Status::Dl, self.identity.inputs.into(), out, |du| app.inputs(du));
+        app.outputs(now, self.image.outputs(), sample, out);
+        let status = if self.news(app) == self.known { Status::Dl } else { Status::Dh };
+        self.reply_inputs(now, status, app, out);
+    }
+    fn reply_inputs(&mut self, now: Local, status: Status, app: &impl Application, out: &mut Outbox) {
+        let held = self.image.held();
+        self.passive.reply(now, status, self.identity.inputs.into(), out, |du| match held {
+            Some(held) => du.copy_from_slice(held),
+            None => app.inputs(du),
+        });
     }
 
-    fn slave_diag(&mut self, now: Local, out: &mut Outbox) {
-        let diagnosis = self.diagnosis().emit();
-        self.passive.reply(now, Status::Dl, diagnosis.len(), out, |du| du.copy_from_slice(&diagnosis));
+    fn slave_diag(&mut self, now: Local, sa: Address, app: &impl Application, out: &mut Outbox) {
+        let mut device = DiagBuffer::new(self.identity.max_diag);
+        app.diagnosis(&mut device);
+        let diagnosis = self.diagnosis(&device);
+        let (standard, extended) = (diagnosis.emit(), diagnosis.extended);
+        self.passive.reply(now, Status::Dl, standard.len() + extended.len(), out, |du| {
+            du[..standard.len()].copy_from_slice(&standard);
+            du[standard.len()..].copy_from_slice(extended);
+        });
+        // A repeated request gets the same octets from the memory of the data link layer.
+        if self.master == Some(sa) {
+            self.known = self.news(app);
+        }
     }
-    /// The diagnosis as Slave_Diag reads it (manual 5.1).
-    pub fn diagnosis(&self) -> Diagnosis<'static> {
-        let status = (self.fault | DiagStatus::BY_SLAVE)
+    /// The diagnosis as Slave_Diag reads it (manual 5.1), with what the device adds.
+    pub fn diagnosis<'d>(&self, device: &'d DiagBuffer) -> Diagnosis<'d> {
+        let status = (self.fault | DiagStatus::BY_SLAVE | self.image.modes() | device.status())
             .with(DiagStatus::STATION_NOT_READY, self.state != SlaveState::DataExch)
             .with(DiagStatus::PRM_REQ, matches!(self.state, SlaveState::PowerOn | SlaveState::WaitPrm))
             .with(DiagStatus::WD_ON, self.watchdog.is_some());
-        Diagnosis { status, master: self.master, ident: self.identity.ident, extended: &[] }
+        Diagnosis { status, master: self.master, ident: self.identity.ident, extended: device.octets() }
+    }
+    fn news(&self, app: &impl Application) -> Known {
+        Known { modes: self.image.modes(), device: app.diagnosis_revision() }
     }
 
     fn set_prm(&mut self, now: Local, sa: Address, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
@@ -316,7 +399,8 @@ impl Slave {
         }
     }
     fn check_prm(&self, prm: &SetPrm<'_>, app: &impl Application) -> Result<(), DiagStatus> {
-        if prm.status.sync() || prm.status.freeze() {
+        let Identity { sync, freeze, .. } = self.identity;
+        if (prm.status.sync() && !sync) || (prm.status.freeze() && !freeze) {
             return Err(DiagStatus::NOT_SUPPORTED);
         }
         let own = prm.ident == self.identity.ident
@@ -338,6 +422,7 @@ impl Slave {
         self.master = Some(sa);
         self.fault = DiagStatus::default();
         self.group = prm.group;
+        self.image.parameterise(prm.status.sync(), prm.status.freeze());
         self.fail_safe = prm.dpv1.fail_safe();
         self.publisher = prm.dpv1.publisher_enable();
         self.dpv1 = prm.dpv1.dpv1_enable();
@@ -354,22 +439,47 @@ impl Slave {
             return self.refuse(now, out);
         }
         self.passive.acknowledge(now, out);
-        if du != self.identity.config {
+        if *du != *self.identity.config {
             self.fail(DiagStatus::CFG_FAULT, SlaveCause::CfgFault, now, app, out);
         } else if self.state == SlaveState::WaitCfg {
             self.enter(SlaveState::DataExch, SlaveCause::Configured, now, app, out);
         }
     }
 
-    fn broadcast(&mut self, now: Local, header: &Header, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
+    fn broadcast(&mut self, telegram: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
+        let &Arrived { now, header, du, sample } = telegram;
         let control = (header.dsap, header.ssap) == (Some(Sap::GLOBAL_CONTROL), Some(Sap::MASTER_MS0));
         if !control || self.state != SlaveState::DataExch || self.is_foreign(header.sa) {
             return;
         }
         match GlobalControl::parse(du) {
             Ok(control) if control.is_synch() => app.synch(now, out),
-            Ok(control) if control.selects(self.group) => app.operate(now, !control.clear, out),
+            Ok(control) if control.selects(self.group) => {
+                app.operate(now, !control.clear, out);
+                self.control(now, control, sample, app, out);
+            }
             _ => {}
+        }
+    }
+    fn control(
+        &mut self,
+        now: Local,
+        control: GlobalControl,
+        sample: u32,
+        app: &mut impl Application,
+        out: &mut Outbox,
+    ) {
+        let before = self.image.modes();
+        let transferred = self.image.control(control, |du| {
+            app.freeze(now, sample, out);
+            app.inputs(du);
+        });
+        if transferred {
+            app.transfer(now, self.image.outputs(), out);
+        }
+        let modes = self.image.modes();
+        if modes != before {
+            out.observe(Observation::Held { outputs: modes.sync_mode(), inputs: modes.freeze_mode() });
         }
     }
 
@@ -395,12 +505,23 @@ impl Slave {
         let from = core::mem::replace(&mut self.state, state);
         out.observe(Observation::SlaveState { from, to: state, cause });
         if from == SlaveState::DataExch && state != SlaveState::DataExch {
-            self.outputs = [0; MAX_OUTPUTS];
-            self.ms1.reset();
+            self.image.leave();
+            self.ms1.reset(app);
             app.leave(now, out);
         }
         if state == SlaveState::DataExch {
             app.enter(now, out);
+            // Start-up reads the diagnosis anyway: only what changes from here on is news.
+            self.known = self.news(app);
         }
+    }
+}
+
+/// Answers a request to an acyclic service.
+fn answer(passive: &mut Passive, now: Local, answer: Answer<'_>, out: &mut Outbox) {
+    match answer {
+        Answer::Acknowledge => passive.acknowledge(now, out),
+        Answer::Data(pdu) => passive.reply(now, Status::Dl, pdu.len(), out, |du| du.copy_from_slice(pdu)),
+        Answer::Refuse(status) => passive.reply(now, status, 0, out, |_| ()),
     }
 }

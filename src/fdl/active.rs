@@ -1,19 +1,41 @@
-//! The active station: claims and holds the token, sends requests, waits for answers, repeats, polls its GAP.
+//! The active station: a member of the token ring. It listens before it enters, holds the token, sends requests, waits
+//! for answers, repeats, polls its GAP and passes the token on.
 //!
 //! | state | input | next state |
 //! |---|---|---|
-//! | Offline | power on | Listening, T_TO armed |
-//! | Listening | any telegram | Listening, T_TO armed anew |
-//! | Listening | T_TO of silence | Claiming: first token to itself |
-//! | Claiming | own first token sent | Claiming: second token to itself |
-//! | Claiming | own second token sent | Holding; [`Confirm::TokenHeld`] |
-//! | Holding | request of the layer above | Awaiting, T_SL armed |
-//! | Awaiting | answer of the asked station | Holding; [`Confirm::Reply`], [`Confirm::Acknowledged`] or [`Confirm::Gap`] |
-//! | Awaiting | anything else, or T_SL over | repeated while retries are left, then Holding; [`Confirm::NoReply`] |
+//! | Offline | power on | Listen_Token, T_TO armed |
+//! | Listen_Token | a telegram | Listen_Token, T_TO armed anew; ready after two complete rotations of the token |
+//! | Listen_Token | FDL status | Listen_Token; answered "not ready", from two rotations on "ready" |
+//! | Listen_Token | second telegram with the own address as source | Offline |
+//! | Listen_Token | ready, token from PS, or twice from another | Use_Token; [`Confirm::TokenHeld`] |
+//! | Listen_Token | T_TO of silence | Claim_Token: first token to itself |
+//! | Active_Idle | token from PS, or twice from another | Use_Token; [`Confirm::TokenHeld`] |
+//! | Active_Idle | FDL status | Active_Idle; answered "in ring" |
+//! | Active_Idle | passed over twice, or the own address as source | Listen_Token |
+//! | Active_Idle | T_TO of silence | Claim_Token: first token to itself |
+//! | Claim_Token | own first token sent | Claim_Token: second token to itself |
+//! | Claim_Token | own second token sent | Use_Token; [`Confirm::TokenHeld`] |
+//! | Claim_Token | a valid telegram | Listen_Token |
+//! | Use_Token | request of the layer above | Await_Data_Response, T_SL armed |
+//! | Use_Token | GAP poll of the layer above | Await_Status_Response, T_SL armed |
+//! | Use_Token | token passed by the layer above | Pass_Token; alone: Use_Token |
+//! | Await_Data_Response | answer of the asked station | Use_Token; [`Confirm::Reply`] or [`Confirm::Acknowledged`] |
+//! | Await_Data_Response | anything else, or T_SL over | repeated while retries are left, then Use_Token; [`Confirm::NoReply`] |
+//! | Await_Status_Response | answer, anything else, or T_SL over | Use_Token; [`Confirm::Gap`]; "ready" is the next station |
+//! | Pass_Token | its last bit has left | Check_Token_Pass, T_SL armed |
+//! | Check_Token_Pass | activity on the line | Active_Idle |
+//! | Check_Token_Pass | T_SL over | Pass_Token, three times to one station, then to the next; alone: Use_Token |
+//! | any with the token | token or request of another station | Active_Idle; [`Confirm::TokenGone`] |
+//! | any with the token | the own address as source | Listen_Token; [`Confirm::TokenGone`] |
 //!
-//! A single active station passes the token to itself and goes on at once. Source: EN 50170-2.
+//! A station alone passes the token to itself and goes on at once. Source: EN 50170-2; the number of attempts as
+//! the active station of profirust has it. Model: a station that found others by listening, or entered a ring, scans
+//! its whole GAP once, an address at every token visit, before it keeps to G.
+
+mod token;
 
 use crate::fdl::params::BusParams;
+use crate::fdl::ring::{Ring, RotationTimer};
 use crate::fdl::{Heard, Outbox, Timer, longest_telegram};
 use crate::observation::{GapAnswer, Observation};
 use crate::time::{Local, Span};
@@ -24,8 +46,10 @@ use crate::wire::{Address, Fcb, Frame, FrameControl, Header, Sap, Service, Stati
 pub enum Confirm<'a> {
     /// Nothing to know.
     Nothing,
-    /// The token was claimed; the ring is this station alone.
+    /// The token is here: claimed, received, or back because nobody else takes it.
     TokenHeld,
+    /// The token is gone without having been passed; what was awaited does not come any more.
+    TokenGone,
     /// A reply to the request.
     Reply {
         /// How it went.
@@ -64,10 +88,29 @@ struct Peer {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum State {
     Offline,
-    Listening,
-    Claiming { tokens_left: u8 },
-    Holding,
-    Awaiting(Awaited),
+    /// How often the own address was heard as source.
+    ListenToken {
+        conflicts: u8,
+    },
+    /// How often the token passed this station over.
+    ActiveIdle {
+        skipped: u8,
+    },
+    ClaimToken {
+        tokens_left: u8,
+    },
+    UseToken,
+    AwaitDataResponse(Awaited),
+    AwaitStatusResponse(Awaited),
+    PassToken(Passing),
+    CheckTokenPass(Passing),
+}
+
+/// A token on its way to the next station.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Passing {
+    to: Address,
+    attempt: u8,
 }
 
 /// The answer that is awaited.
@@ -75,7 +118,6 @@ enum State {
 struct Awaited {
     from: Address,
     retries_left: u8,
-    gap: bool,
     /// A telegram was under way when T_SL ran out; its end is awaited once.
     extended: bool,
 }
@@ -90,12 +132,17 @@ pub struct Active {
     t_id2: Span,
     t_sl: Span,
     state: State,
+    ring: Ring,
+    timer: RotationTimer,
+    /// The high-priority message that every token visit has, whatever is left of T_TH, was sent.
+    high_used: bool,
+    /// Sender of a token that did not come from PS, until it is repeated.
+    doubted: Option<Address>,
     peers: [Peer; 127],
     /// First instant at which a request may begin.
     free_at: Local,
     /// The last request, for repeating.
     last: Frame,
-    gap_next: u8,
 }
 
 impl Active {
@@ -111,7 +158,10 @@ impl Active {
             peers: [Peer { fcb: Fcb::First, operational: false }; 127],
             free_at: Local::ZERO,
             last: Frame::new(),
-            gap_next: address.get(),
+            ring: Ring::new(address, bus.hsa),
+            timer: RotationTimer::new(bus.span(bus.t_tr)),
+            high_used: false,
+            doubted: None,
         }
     }
     /// The station's address.
@@ -127,6 +177,10 @@ impl Active {
     pub const fn free_at(&self) -> Local {
         self.free_at
     }
+    /// Whatever was sent before, the next request does not begin before `now`.
+    pub fn not_before(&mut self, now: Local) {
+        self.free_at = self.free_at.max(now);
+    }
     /// T_ID1 as a span.
     pub const fn t_id1(&self) -> Span {
         self.t_id1
@@ -138,6 +192,31 @@ impl Active {
         let answered = rate.span(self.bus.max_tsdr) + rate.octets(reply);
         rate.octets(octets) + answered.max(self.t_sl)
     }
+    /// What this station knows of the ring.
+    pub const fn ring(&self) -> &Ring {
+        &self.ring
+    }
+    /// Whether this station has the token and awaits no answer: requests, GAP polls and the token may be sent.
+    pub fn may_send(&self) -> bool {
+        self.state == State::UseToken
+    }
+    /// T_TH that is left at `now`; not positive when it is used up.
+    pub fn t_th(&self, now: Local) -> Span {
+        self.timer.t_th(now)
+    }
+    /// Whether a message with high priority may begin at `now`: one in every token visit, more while T_TH lasts
+    /// (EN 50170-2 p. 119).
+    pub fn may_high(&self, now: Local) -> bool {
+        !self.high_used || self.may_low(now)
+    }
+    /// Whether a message with low priority may begin at `now`: T_RR is below T_TR (EN 50170-2 p. 119).
+    pub fn may_low(&self, now: Local) -> bool {
+        self.t_th(now) > Span::ZERO
+    }
+    /// Whether the GAP may be polled at `now`: something of T_TH remains (EN 50170-2 p. 102).
+    pub fn may_gap(&self, now: Local) -> bool {
+        self.may_low(now)
+    }
     /// Forgets that `peer` ever answered: its next request has FCV = 0.
     pub fn reset_peer(&mut self, peer: Address) {
         self.peers[usize::from(peer.get())] = Peer { fcb: Fcb::First, operational: false };
@@ -145,11 +224,8 @@ impl Active {
 
     /// The supply came on.
     pub fn power_on(&mut self, now: Local, out: &mut Outbox) {
-        self.state = State::Listening;
-        out.arm(Timer::Slot, now + self.t_to());
-    }
-    fn t_to(&self) -> Span {
-        self.bus.span(self.bus.t_to(self.address.get()))
+        self.state = State::ListenToken { conflicts: 0 };
+        self.await_silence(now, out);
     }
 
     /// Sends a telegram that nobody answers to `da`, its first bit at `at`. Returns its end.
@@ -173,32 +249,26 @@ impl Active {
     pub fn clock_sent(&mut self, now: Local) {
         self.free_at = now + self.t_id2;
     }
-    /// Passes the token to itself, its first bit at `at`. Returns its end.
-    pub fn pass_token(&mut self, at: Local, out: &mut Outbox) -> Local {
-        out.send(at, |frame| frame.set_token(self.address, self.address));
-        let end = at + self.bus.rate.octets(3);
-        self.free_at = end + self.t_id1;
-        end
-    }
-    /// Polls the next address of the GAP with FDL status, its first bit at `at`. Returns the address.
+    /// Polls the next address of the GAP with FDL status, its first bit at `at`. Returns the address; none, and
+    /// nothing is sent, where no address lies between this station and the next.
     ///
     /// # Panics
     /// While another answer is awaited: a bug of the caller.
-    pub fn poll_gap(&mut self, at: Local, out: &mut Outbox) -> Address {
-        let to = self.next_gap();
+    pub fn poll_gap(&mut self, at: Local, out: &mut Outbox) -> Option<Address> {
+        let to = self.ring.next_gap()?;
+        self.poll(at, to, out);
+        Some(to)
+    }
+    /// Asks `to` for its FDL status, first bit at `at`. [`Confirm::Gap`] follows.
+    ///
+    /// # Panics
+    /// While another answer is awaited: a bug of the caller.
+    pub fn poll(&mut self, at: Local, to: Address, out: &mut Outbox) {
+        assert!(self.may_send(), "one request at a time");
         let header = Header::request(to, self.address, Service::FdlStatus, Fcb::Unused);
         self.last.set_data(&header, &[]).expect("an empty request fits");
-        self.await_answer(at, Awaited { from: to, retries_left: 0, gap: true, extended: false }, out);
-        to
-    }
-    fn next_gap(&mut self) -> Address {
-        loop {
-            self.gap_next = if self.gap_next >= self.bus.hsa { 0 } else { self.gap_next + 1 };
-            match Address::new(self.gap_next) {
-                Some(address) if address != self.address => return address,
-                _ => {}
-            }
-        }
+        self.send_last(at, out);
+        self.state = State::AwaitStatusResponse(Awaited { from: to, retries_left: 0, extended: false });
     }
     /// Sends a request of `len` octets that `write` fills in, its first bit at `at`, and awaits the answer.
     ///
@@ -212,6 +282,8 @@ impl Active {
         out: &mut Outbox,
         write: impl FnOnce(&mut [u8]),
     ) {
+        assert!(self.may_send(), "one request at a time");
+        self.high_used |= matches!(request.service, Service::SrdHigh | Service::Msrd);
         let peer = self.peers[usize::from(request.to.get())];
         let mut header = Header::request(request.to, self.address, request.service, peer.fcb);
         if let Some((dsap, ssap)) = request.saps {
@@ -219,99 +291,124 @@ impl Active {
         }
         self.last.set_data_with(&header, len, write).expect("a request fits");
         let retries_left = if peer.operational { request.retries } else { 0 };
-        self.await_answer(at, Awaited { from: request.to, retries_left, gap: false, extended: false }, out);
+        self.send_last(at, out);
+        self.state = State::AwaitDataResponse(Awaited { from: request.to, retries_left, extended: false });
     }
-    fn await_answer(&mut self, at: Local, awaited: Awaited, out: &mut Outbox) {
-        assert!(self.state == State::Holding, "one request at a time");
-        self.send_last(at, awaited, out);
-    }
-    fn send_last(&mut self, at: Local, awaited: Awaited, out: &mut Outbox) {
+    fn send_last(&self, at: Local, out: &mut Outbox) {
         let last = &self.last;
         out.send(at, |frame| frame.copy_from(last));
         out.arm(Timer::Slot, at + self.bus.rate.octets(last.len()) + self.t_sl);
-        self.state = State::Awaiting(awaited);
     }
 
     /// Takes a telegram whose last bit arrived at `now`.
     pub fn heard<'a>(&mut self, now: Local, heard: Heard<'a>, out: &mut Outbox) -> Confirm<'a> {
+        let telegram = Telegram::parse(heard.octets).ok();
         match self.state {
-            State::Offline | State::Claiming { .. } | State::Holding => Confirm::Nothing,
-            State::Listening => {
-                out.arm(Timer::Slot, now + self.t_to());
-                Confirm::Nothing
+            State::ListenToken { conflicts } => self.listens(now, conflicts, telegram, out),
+            State::ActiveIdle { skipped } => self.idles(now, skipped, telegram, out),
+            State::CheckTokenPass(_) => self.idles(now, 0, telegram, out),
+            State::ClaimToken { .. } if telegram.is_some() => self.listens_again(now, out),
+            State::Offline | State::ClaimToken { .. } => Confirm::Nothing,
+            State::UseToken | State::PassToken(_) => {
+                self.disputed(now, telegram.as_ref(), out).unwrap_or(Confirm::Nothing)
             }
-            State::Awaiting(awaited) => self.answered(now, awaited, heard, out),
+            State::AwaitDataResponse(awaited) => {
+                let disputed = self.disputed(now, telegram.as_ref(), out);
+                disputed.unwrap_or_else(|| self.answered(now, awaited, telegram, out))
+            }
+            State::AwaitStatusResponse(Awaited { from, .. }) => {
+                let disputed = self.disputed(now, telegram.as_ref(), out);
+                disputed.unwrap_or_else(|| self.status(now, from, telegram.as_ref(), out))
+            }
         }
     }
-    fn answered<'a>(&mut self, now: Local, awaited: Awaited, heard: Heard<'a>, out: &mut Outbox) -> Confirm<'a> {
-        let confirm = match Telegram::parse(heard.octets) {
-            Ok(Telegram::ShortAck) if !awaited.gap => Confirm::Acknowledged,
-            Ok(Telegram::Data { header, du }) if header.sa == awaited.from => match header.fc {
-                FrameControl::Response { station, .. } if awaited.gap => Confirm::Gap(gap_answer(station)),
-                FrameControl::Response { status, .. } if self.is_for_me(header.da) => Confirm::Reply { status, du },
-                _ => return self.unanswered(now, awaited, out),
-            },
+    fn answered<'a>(
+        &mut self,
+        now: Local,
+        awaited: Awaited,
+        telegram: Option<Telegram<'a>>,
+        out: &mut Outbox,
+    ) -> Confirm<'a> {
+        let confirm = match telegram {
+            Some(Telegram::ShortAck) => Confirm::Acknowledged,
+            Some(Telegram::Data { header, du }) if header.sa == awaited.from && self.is_for_me(header.da) => {
+                match header.fc {
+                    FrameControl::Response { status, .. } => Confirm::Reply { status, du },
+                    FrameControl::Request { .. } => return self.unanswered(now, awaited, out),
+                }
+            }
             _ => return self.unanswered(now, awaited, out),
         };
+        self.goes_on(now, out);
+        let peer = &mut self.peers[usize::from(awaited.from.get())];
+        *peer = Peer { fcb: peer.fcb.next(), operational: true };
+        confirm
+    }
+    /// The wait is over; the next telegram begins T_ID1 later.
+    fn goes_on(&mut self, now: Local, out: &mut Outbox) {
         out.disarm(Timer::Slot);
         self.free_at = now + self.t_id1;
-        self.state = State::Holding;
-        if !awaited.gap {
-            let peer = &mut self.peers[usize::from(awaited.from.get())];
-            *peer = Peer { fcb: peer.fcb.next(), operational: true };
-        }
-        confirm
+        self.state = State::UseToken;
     }
     /// A reply goes to this station, or from a publisher to everybody.
     fn is_for_me(&self, da: Address) -> bool {
         da == self.address || da == Address::BROADCAST
     }
+    /// What came in place of an FDL status, or none within T_SL.
+    fn status(
+        &mut self,
+        now: Local,
+        from: Address,
+        telegram: Option<&Telegram<'_>>,
+        out: &mut Outbox,
+    ) -> Confirm<'static> {
+        let answer = match telegram {
+            Some(Telegram::Data { header, .. }) if header.sa == from => match header.fc {
+                FrameControl::Response { station, .. } => gap_answer(station),
+                FrameControl::Request { .. } => GapAnswer::Absent,
+            },
+            _ => GapAnswer::Absent,
+        };
+        self.goes_on(now, out);
+        if self.ring.polled(from, answer) {
+            out.observe(Observation::StationJoined { station: from });
+        }
+        Confirm::Gap(answer)
+    }
 
     /// [`Timer::Slot`] came due; `busy` tells whether characters are on the line.
     pub fn slot_over(&mut self, now: Local, busy: bool, out: &mut Outbox) -> Confirm<'static> {
-        match self.state {
-            State::Offline | State::Holding => Confirm::Nothing,
-            State::Listening => {
-                self.claim(now, 1, out);
-                Confirm::Nothing
-            }
-            State::Claiming { tokens_left: 0 } => {
-                self.state = State::Holding;
-                self.free_at = now;
-                out.observe(Observation::TokenClaimed);
-                Confirm::TokenHeld
-            }
-            State::Claiming { tokens_left } => {
-                self.claim(now, tokens_left - 1, out);
-                Confirm::Nothing
-            }
+        match &mut self.state {
             // The answer began within T_SL: its end decides, and something that never ends does not.
-            State::Awaiting(awaited) if busy && !awaited.extended => {
+            State::AwaitDataResponse(awaited) | State::AwaitStatusResponse(awaited) if busy && !awaited.extended => {
+                awaited.extended = true;
                 out.arm(Timer::Slot, now + longest_telegram(self.bus.rate));
-                self.state = State::Awaiting(Awaited { extended: true, ..awaited });
-                Confirm::Nothing
+                return Confirm::Nothing;
             }
-            State::Awaiting(awaited) => self.unanswered(now, awaited, out),
+            _ => {}
         }
-    }
-    fn claim(&mut self, now: Local, tokens_left: u8, out: &mut Outbox) {
-        let end = self.pass_token(now, out);
-        out.arm(Timer::Slot, end + self.t_id1);
-        self.state = State::Claiming { tokens_left };
+        match self.state {
+            State::Offline | State::UseToken => Confirm::Nothing,
+            State::ListenToken { .. } | State::ActiveIdle { .. } => self.silent(now, busy, out),
+            State::ClaimToken { tokens_left } => self.claims(now, tokens_left, out),
+            State::PassToken(passing) => self.passed(now, passing, out),
+            State::CheckTokenPass(passing) => self.not_taken(now, passing, busy, out),
+            State::AwaitDataResponse(awaited) => self.unanswered(now, awaited, out),
+            State::AwaitStatusResponse(Awaited { from, .. }) => self.status(now, from, None, out),
+        }
     }
     /// Nothing valid came: repeat, or give up. The next telegram begins T_ID1 later either way.
     fn unanswered(&mut self, now: Local, awaited: Awaited, out: &mut Outbox) -> Confirm<'static> {
-        self.free_at = now + self.t_id1;
+        self.goes_on(now, out);
         if awaited.retries_left > 0 {
             out.observe(Observation::Retry { slave: awaited.from });
-            let awaited = Awaited { retries_left: awaited.retries_left - 1, extended: false, ..awaited };
-            self.send_last(self.free_at, awaited, out);
+            self.send_last(self.free_at, out);
+            self.state = State::AwaitDataResponse(Awaited {
+                retries_left: awaited.retries_left - 1,
+                extended: false,
+                ..awaited
+            });
             return Confirm::Nothing;
-        }
-        out.disarm(Timer::Slot);
-        self.state = State::Holding;
-        if awaited.gap {
-            return Confirm::Gap(GapAnswer::Absent);
         }
         self.reset_peer(awaited.from);
         Confirm::NoReply
@@ -331,3 +428,6 @@ const fn gap_answer(station: StationType) -> GapAnswer {
         StationType::MasterInRing => GapAnswer::InRing,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,6 +7,7 @@
 pub mod active;
 pub mod params;
 pub mod passive;
+pub mod ring;
 
 use crate::observation::Observation;
 use crate::time::{Local, Span};
@@ -35,7 +36,8 @@ pub enum Input<'a, C> {
     PowerOn,
     /// The last bit of a telegram arrived. The octets may be disturbed.
     Telegram(Heard<'a>),
-    /// The last bit of the telegram that asked for it ([`Outbox::send_clock`]) has left this station.
+    /// A cycle begins: the last bit of the telegram that asked for it ([`Outbox::send_clock`]) has left this station,
+    /// or the instant of [`Outbox::begin_cycle`] came.
     Sent,
     /// An armed deadline came due.
     Deadline {
@@ -148,11 +150,24 @@ pub enum Timer {
     SetPoint,
     /// The LEDs may change because nothing was heard.
     Leds,
+    /// A slave-to-slave link may be lost (Model: D27).
+    Links,
+    /// The supervision of an MS2 connection strikes; the earliest of all.
+    Connection,
 }
 
 impl Timer {
     /// Every timer, in the order of their numbers.
-    pub const ALL: [Self; 6] = [Self::Slot, Self::Schedule, Self::Watchdog, Self::Window, Self::SetPoint, Self::Leds];
+    pub const ALL: [Self; 8] = [
+        Self::Slot,
+        Self::Schedule,
+        Self::Watchdog,
+        Self::Window,
+        Self::SetPoint,
+        Self::Leds,
+        Self::Links,
+        Self::Connection,
+    ];
 }
 
 /// A station's answer to one input. Reused from step to step, so that no step allocates.
@@ -160,9 +175,10 @@ impl Timer {
 pub struct Outbox {
     frame: Frame,
     send: Option<Send>,
+    cycle_at: Option<Local>,
     /// What becomes of the deadlines; an entry counts if its bit in `ordered` is set.
     orders: [Order; Self::DEADLINES],
-    ordered: u8,
+    ordered: u16,
     sample_with_telegrams: Option<bool>,
     observations: [Option<Observation>; Self::MAX_OBSERVATIONS],
     observed: usize,
@@ -193,8 +209,9 @@ impl Default for Outbox {
 }
 
 impl Outbox {
-    /// Observations that one step may make: a few for each of 126 stations. A step that needs more is a bug.
-    pub const MAX_OBSERVATIONS: usize = 160;
+    /// Observations that one step may make: a few for each of 126 stations, as when a master with so many slaves is
+    /// switched on again. A step that needs more is a bug.
+    pub const MAX_OBSERVATIONS: usize = 512;
     /// Deadlines of a station: the timers by their numbers, and behind them the asked sample.
     pub const DEADLINES: usize = Self::SAMPLE + 1;
     /// Number of the asked sample among the deadlines.
@@ -205,6 +222,7 @@ impl Outbox {
         Self {
             frame: Frame::new(),
             send: None,
+            cycle_at: None,
             orders: [Order::Off; Self::DEADLINES],
             ordered: 0,
             sample_with_telegrams: None,
@@ -216,6 +234,7 @@ impl Outbox {
     /// Makes it empty for the next step.
     pub fn clear(&mut self) {
         self.send = None;
+        self.cycle_at = None;
         self.ordered = 0;
         self.sample_with_telegrams = None;
         self.observed = 0;
@@ -235,6 +254,11 @@ impl Outbox {
     pub fn send_clock(&mut self, at: Local, fill: impl FnOnce(&mut Frame)) {
         self.send(at, fill);
         self.send = Some(Send { at, clock: true });
+    }
+
+    /// A cycle without clock telegram begins at `at`: [`Input::Sent`] comes then.
+    pub fn begin_cycle(&mut self, at: Local) {
+        self.cycle_at = Some(at);
     }
 
     /// Arms `timer`; an earlier arming is forgotten.
@@ -270,6 +294,10 @@ impl Outbox {
     /// The telegram to send, if there is one.
     pub fn sending(&self) -> Option<(Send, &Frame)> {
         self.send.map(|send| (send, &self.frame))
+    }
+    /// When a cycle without clock telegram begins, if one does.
+    pub fn beginning_cycle(&self) -> Option<Local> {
+        self.cycle_at
     }
     /// What becomes of the deadlines: their numbers, ascending, with the order for each. The others stay as they are.
     pub fn orders(&self) -> impl Iterator<Item = (usize, Order)> {

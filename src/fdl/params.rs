@@ -25,6 +25,8 @@ pub struct BusParams {
     pub gap_factor: u8,
     /// Highest station address, 1..=126.
     pub hsa: u8,
+    /// T_TR, target rotation time of the token, 256..=16 777 960.
+    pub t_tr: Tbit,
 }
 
 /// A rule between bus parameters that does not hold.
@@ -40,6 +42,12 @@ pub struct ParamRule {
     pub max: u32,
     /// The rule in words.
     pub rule: &'static str,
+}
+impl ParamRule {
+    /// Whether the value is allowed by the others.
+    pub fn holds(&self) -> bool {
+        (self.min..=self.max).contains(&self.value)
+    }
 }
 impl fmt::Display for ParamRule {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -72,7 +80,12 @@ impl BusParams {
             max_retry_limit: retries,
             gap_factor: 10,
             hsa: 126,
+            t_tr: Self::usual_t_tr(126),
         }
+    }
+    /// The usual T_TR: 5000 t_bit for each address up to HSA (STEP 7, ranges of the bus parameters).
+    pub const fn usual_t_tr(hsa: u8) -> Tbit {
+        Tbit(5_000 * hsa as u32)
     }
     /// T_SM = 2 + 2 T_SET + T_QUI, safety margin.
     pub const fn t_sm(&self) -> Tbit {
@@ -90,21 +103,27 @@ impl BusParams {
     pub const fn t_to(&self, address: u8) -> Tbit {
         Tbit((6 + 2 * address as u32) * self.t_sl.0)
     }
+    /// T_TC, token cycle: the token's three characters and T_ID1.
+    pub fn t_tc(&self) -> Tbit {
+        Tbit::of_octets(3) + self.t_id1()
+    }
+    /// The least T_TR with which `masters` active stations have one message cycle of `t_mc` each, with high priority,
+    /// and `low` of them in a rotation with low priority: n (T_TC + T_MC) + k T_MC (felser.ch, token_umlaufzeit).
+    pub fn least_t_tr(&self, masters: u32, low: u32, t_mc: Tbit) -> Tbit {
+        Tbit(masters * (self.t_tc().0 + t_mc.0) + low * t_mc.0)
+    }
     /// `bits` as a span at this bus's rate.
     pub const fn span(&self, bits: Tbit) -> Span {
         self.rate.span(bits)
     }
 
-    /// Checks every rule between the parameters for a bus with a longest one-way delay of `t_td`.
-    ///
-    /// # Errors
-    /// The first rule that does not hold, with its numbers.
-    pub fn check(&self, t_td: Span) -> Result<(), ParamRule> {
+    /// Every rule between the parameters for a bus with a longest one-way delay of `t_td`, with its numbers.
+    pub fn rules(&self, t_td: Span) -> [ParamRule; 9] {
         let t_td = t_td.ceil_to(self.rate.bit()).div_floor(self.rate.bit()) as u32;
         let idle = 35 + 2 * self.t_set.0 + self.t_qui.0;
         let slot = (2 * t_td + self.max_tsdr.0).max(2 * t_td + self.t_id1().0) + 11 + self.t_sm().0;
         let min_tsdr_max = 255.min(self.max_tsdr.0.saturating_sub(1)).min(idle - 1);
-        let rules = [
+        [
             ("t_set", self.t_set.0, 1, 494, "1 <= T_SET <= 494"),
             ("t_qui", self.t_qui.0, 0, 31.min(self.min_tsdr.0.saturating_sub(1)), "T_QUI <= min(31, min T_SDR - 1)"),
             ("max_tsdr", self.max_tsdr.0, idle, 1023, "35 + 2 T_SET + T_QUI <= max T_SDR <= 1023"),
@@ -119,13 +138,19 @@ impl BusParams {
             ("max_retry_limit", u32::from(self.max_retry_limit), 1, 15, "1 <= max_retry_limit <= 15"),
             ("gap_factor", u32::from(self.gap_factor), 1, 100, "1 <= G <= 100"),
             ("hsa", u32::from(self.hsa), 1, 126, "HSA <= 126"),
-        ];
-        for (name, value, min, max, rule) in rules {
-            if !(min..=max).contains(&value) {
-                return Err(ParamRule { name, value, min, max, rule });
-            }
+            ("t_tr", self.t_tr.0, 256, 16_777_960, "256 <= T_TR <= 16 777 960"),
+        ]
+        .map(|(name, value, min, max, rule)| ParamRule { name, value, min, max, rule })
+    }
+    /// Checks every rule between the parameters for a bus with a longest one-way delay of `t_td`.
+    ///
+    /// # Errors
+    /// The first rule that does not hold, with its numbers.
+    pub fn check(&self, t_td: Span) -> Result<(), ParamRule> {
+        match self.rules(t_td).into_iter().find(|rule| !rule.holds()) {
+            Some(broken) => Err(broken),
+            None => Ok(()),
         }
-        Ok(())
     }
 }
 
@@ -160,5 +185,25 @@ mod tests {
         bus.t_sl = Tbit(800);
         let rule = bus.check(Span::from_ns(500)).unwrap_err();
         assert_eq!((rule.name, rule.value, rule.min), ("t_sl", 800, 2 * 6 + 800 + 11 + 43));
+    }
+
+    /// felser.ch, token_umlaufzeit: n (T_TC + T_MC) + k T_MC.
+    #[test]
+    fn the_least_t_tr_has_room_for_every_master() {
+        let bus = BusParams::profile(BitRate::M1_5);
+        // Token 33, T_ID1 37; a message cycle of 300.
+        assert_eq!(bus.t_tc(), Tbit(70));
+        assert_eq!(bus.least_t_tr(3, 0, Tbit(300)), Tbit(3 * 370));
+        assert_eq!(bus.least_t_tr(3, 2, Tbit(300)), Tbit(3 * 370 + 2 * 300));
+    }
+
+    #[test]
+    fn t_tr_has_a_range_and_a_rule_of_thumb() {
+        let mut bus = BusParams::profile(BitRate::M12);
+        assert_eq!(bus.t_tr, Tbit(630_000));
+        for (t_tr, fits) in [(255, false), (256, true), (16_777_960, true), (16_777_961, false)] {
+            bus.t_tr = Tbit(t_tr);
+            assert_eq!(bus.check(Span::ZERO).is_ok(), fits, "{t_tr}");
+        }
     }
 }

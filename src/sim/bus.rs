@@ -1,31 +1,12 @@
-//! The line: telegrams under way, who they reach and when, and what happens when two overlap.
+//! The bus: telegrams under way, who they reach and when, and what happens when two overlap.
+//!
+//! A telegram reaches a listener after the delay of the path between the two. Where a link on the path has jitter, each
+//! telegram draws once from that link's stream, however many listen: whoever is behind the link hears the same.
 
+use crate::sim::noise::LinkJitter;
+use crate::sim::topology::Delays;
 use crate::time::{Span, Time};
 use crate::wire::Frame;
-
-/// Ticks [1/12 ns] that a telegram takes for one metre of cable: 5 ns.
-const TICKS_PER_METRE: u64 = 60;
-
-/// Delay along `mm` of cable: 5 ns/m, rounded down to a tick.
-pub const fn cable_delay(mm: u64) -> Span {
-    Span::from_ticks((mm * TICKS_PER_METRE / 1_000) as i64)
-}
-
-/// A place on the line [delay from its end].
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub struct Place(Span);
-
-impl Place {
-    /// The place `mm` from the end of the cable.
-    pub const fn at(mm: u64) -> Self {
-        Self(cable_delay(mm))
-    }
-    /// Delay between two places.
-    #[inline]
-    pub fn delay(self, other: Self) -> Span {
-        (self.0 - other.0).abs()
-    }
-}
 
 /// A telegram on the line.
 #[derive(Clone, Debug)]
@@ -38,7 +19,8 @@ pub struct Flight {
     pub sender: usize,
     /// Number of the telegram, counted on the line.
     pub number: u64,
-    place: Place,
+    /// How much later than nominal it comes out of each link with jitter.
+    strays: Vec<Span>,
     /// The characters.
     pub frame: Frame,
     /// Listeners that have not heard its end yet.
@@ -52,15 +34,27 @@ pub struct FlightId(u16);
 /// Telegrams kept for telling whether the line is busy somewhere: more are never near each other.
 const RECENT: usize = 4;
 
-/// The line.
-#[derive(Clone, Debug, Default)]
+/// When a telegram was on the line at its sender.
+#[derive(Clone, Debug)]
+struct Sent {
+    start: Time,
+    end: Time,
+    sender: usize,
+    strays: Vec<Span>,
+}
+
+/// The bus.
+#[derive(Clone, Debug)]
 pub struct Bus {
+    delays: Delays,
+    /// Of the links that have any, in the order of `delays`.
+    jitter: Vec<LinkJitter>,
     flights: Vec<Flight>,
     free: Vec<FlightId>,
     /// Telegrams sent.
     sent: u64,
-    /// The telegrams sent last, newest first.
-    recent: [Option<(Time, Time, Place)>; RECENT],
+    /// The telegrams sent last, each at the place of its number.
+    recent: Vec<Sent>,
     last: Option<FlightId>,
     /// End and sender of the telegram that ends last of all.
     busy_until: Time,
@@ -68,25 +62,42 @@ pub struct Bus {
 }
 
 impl Bus {
+    /// A silent bus. `jitter` is that of the links whose paths `delays` knows as unsteady, in the same order.
+    pub const fn new(delays: Delays, jitter: Vec<LinkJitter>) -> Self {
+        Self {
+            delays,
+            jitter,
+            flights: Vec::new(),
+            free: Vec::new(),
+            sent: 0,
+            recent: Vec::new(),
+            last: None,
+            busy_until: Time::ZERO,
+            busy_by: 0,
+        }
+    }
+    /// The delays between the stations.
+    pub const fn delays(&self) -> &Delays {
+        &self.delays
+    }
+
     /// Puts a telegram on the line. Returns its name, and the station it overlaps with, if any.
-    pub fn send(
-        &mut self,
-        sender: usize,
-        place: Place,
-        (start, end): (Time, Time),
-        frame: &Frame,
-    ) -> (FlightId, Option<usize>) {
+    pub fn send(&mut self, sender: usize, (start, end): (Time, Time), frame: &Frame) -> (FlightId, Option<usize>) {
         let id = self.free.pop().unwrap_or_else(|| {
-            self.flights.push(Flight { start, end, sender, number: 0, place, frame: Frame::new(), listeners: 0 });
+            let (strays, frame) = (Vec::new(), Frame::new());
+            self.flights.push(Flight { start, end, sender, number: 0, strays, frame, listeners: 0 });
             FlightId(self.flights.len() as u16 - 1)
         });
         let flight = &mut self.flights[usize::from(id.0)];
         flight.frame.copy_from(frame);
-        (flight.start, flight.end, flight.sender, flight.place, flight.listeners) = (start, end, sender, place, 0);
+        (flight.start, flight.end, flight.sender, flight.listeners) = (start, end, sender, 0);
         flight.number = self.sent;
+        if !self.jitter.is_empty() {
+            flight.strays.clear();
+            flight.strays.extend(self.jitter.iter_mut().map(LinkJitter::draw));
+        }
+        self.remember(id);
         self.sent += 1;
-        self.recent.rotate_right(1);
-        self.recent[0] = Some((start, end, place));
 
         let hit = (start < self.busy_until).then_some(self.busy_by);
         if hit.is_some() {
@@ -101,10 +112,40 @@ impl Bus {
         self.last = Some(id);
         (id, hit)
     }
+    /// Keeps the telegram for [`Self::is_busy`] instead of the oldest kept.
+    fn remember(&mut self, id: FlightId) {
+        let &Flight { start, end, sender, ref strays, .. } = &self.flights[usize::from(id.0)];
+        match self.recent.get_mut(self.sent as usize % RECENT) {
+            Some(kept) => {
+                (kept.start, kept.end, kept.sender) = (start, end, sender);
+                if !strays.is_empty() {
+                    kept.strays.clone_from(strays);
+                }
+            }
+            None => self.recent.push(Sent { start, end, sender, strays: strays.clone() }),
+        }
+    }
     /// Overlapping characters fail their parity: the receiver sees a telegram that does not end as it should.
     fn garble(&mut self, id: FlightId) {
         if let Some(octet) = self.flights[usize::from(id.0)].frame.octets_mut().last_mut() {
             *octet ^= 0xFF;
+        }
+    }
+
+    /// The station `sender` lost its supply at `now`: what it would have sent later never reaches the line. What is
+    /// under way is finished (Model: a telegram that breaks off would be dropped all the same).
+    pub fn silence(&mut self, sender: usize, now: Time) {
+        let coming = |by: usize, start: Time| by == sender && start > now;
+        for (index, flight) in self.flights.iter_mut().enumerate() {
+            if coming(flight.sender, flight.start) && !self.free.contains(&FlightId(index as u16)) {
+                flight.frame.clear();
+            }
+        }
+        for sent in self.recent.iter_mut().filter(|sent| coming(sent.sender, sent.start)) {
+            sent.end = sent.start;
+            if self.busy_by == sender {
+                self.busy_until = self.busy_until.min(now);
+            }
         }
     }
 
@@ -129,11 +170,26 @@ impl Bus {
         debug_assert_eq!(self.flights[usize::from(id.0)].listeners, 0);
         self.free.push(id);
     }
-    /// Whether a receiver at `place` sees characters at `now`.
-    pub fn is_busy(&self, now: Time, place: Place) -> bool {
-        self.recent.iter().flatten().any(|&(start, end, sender)| {
-            let delay = sender.delay(place);
-            start + delay <= now && now < end + delay
+    /// When the telegram's last bit reaches the station `listener`, and the number of the telegram.
+    #[inline]
+    pub fn arrival(&self, id: FlightId, listener: usize) -> (Time, u64) {
+        if !self.delays.is_steady() {
+            return self.strayed_arrival(id, listener);
+        }
+        let flight = self.flight(id);
+        (flight.end + self.delays.nominal(flight.sender, listener), flight.number)
+    }
+    /// The same with the jitter of links, out of the way of networks that have none.
+    #[cold]
+    fn strayed_arrival(&self, id: FlightId, listener: usize) -> (Time, u64) {
+        let flight = self.flight(id);
+        (flight.end + self.delays.of(flight.sender, listener, &flight.strays), flight.number)
+    }
+    /// Whether the station `listener` sees characters at `now`.
+    pub fn is_busy(&self, now: Time, listener: usize) -> bool {
+        self.recent.iter().any(|sent| {
+            let delay = self.delays.of(sent.sender, listener, &sent.strays);
+            sent.start + delay <= now && now < sent.end + delay
         })
     }
 }
@@ -141,6 +197,7 @@ impl Bus {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sim::topology::{CABLE_DELAY, Link, Place, Tree, cable_delay};
     use crate::wire::Address;
 
     fn token() -> Frame {
@@ -152,33 +209,90 @@ mod tests {
         Time::ZERO + Span::from_ns(ns)
     }
 
-    #[test]
-    fn five_nanoseconds_per_metre() {
-        assert_eq!(Place::at(0).delay(Place::at(100_000)), Span::from_ns(500));
-        assert_eq!(Place::at(70_000).delay(Place::at(20_000)), Span::from_ns(250));
+    /// Two stations at the ends of 10 m of cable.
+    fn line() -> Bus {
+        let places = [0, 10_000].map(|mm| Place::new(0, cable_delay(mm, CABLE_DELAY)));
+        Bus::new(Delays::new(&Tree::line(), &places, &[]), Vec::new())
     }
 
     #[test]
     fn telegrams_that_overlap_are_both_garbled_and_those_that_follow_are_not() {
-        let mut bus = Bus::default();
-        let (a, clean) = bus.send(0, Place::default(), (ns(0), ns(100)), &token());
+        let mut bus = line();
+        let (a, clean) = bus.send(0, (ns(0), ns(100)), &token());
         bus.add_listeners(a, 1);
-        let (b, hit) = bus.send(1, Place::default(), (ns(99), ns(199)), &token());
+        let (b, hit) = bus.send(1, (ns(99), ns(199)), &token());
         bus.add_listeners(b, 1);
         assert_eq!((clean, hit), (None, Some(0)));
         for id in [a, b] {
             assert!(bus.flight(id).frame.octets() != token().octets());
             bus.heard(id);
         }
-        let (c, hit) = bus.send(0, Place::default(), (ns(199), ns(299)), &token());
+        let (c, hit) = bus.send(0, (ns(199), ns(299)), &token());
         assert_eq!((hit, bus.flight(c).frame.octets()), (None, token().octets()));
     }
 
     #[test]
+    fn what_a_station_without_supply_had_planned_never_comes() {
+        let mut bus = line();
+        let (running, _) = bus.send(0, (ns(0), ns(100)), &token());
+        bus.add_listeners(running, 1);
+        bus.silence(0, ns(50));
+        assert_eq!(bus.flight(running).frame.octets(), token().octets(), "under way, it is finished");
+        bus.heard(running);
+        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token());
+        bus.add_listeners(planned, 1);
+        bus.silence(1, ns(300));
+        assert!(!bus.flight(planned).frame.is_empty(), "another station's supply");
+        bus.silence(0, ns(300));
+        assert!(bus.flight(planned).frame.is_empty());
+        assert!(!bus.is_busy(ns(550), 0), "the line stays free");
+        let (_, hit) = bus.send(1, (ns(550), ns(650)), &token());
+        assert_eq!(hit, None);
+    }
+
+    #[test]
     fn a_receiver_sees_the_line_busy_one_delay_later() {
-        let mut bus = Bus::default();
-        bus.send(0, Place::at(0), (ns(100), ns(200)), &token());
-        let far = Place::at(10_000);
-        assert_eq!([149, 150, 249, 250].map(|t| bus.is_busy(ns(t), far)), [false, true, true, false]);
+        let mut bus = line();
+        let (id, _) = bus.send(0, (ns(100), ns(200)), &token());
+        assert_eq!([149, 150, 249, 250].map(|t| bus.is_busy(ns(t), 1)), [false, true, true, false]);
+        assert_eq!((bus.arrival(id, 0), bus.arrival(id, 1)), ((ns(200), 0), (ns(250), 0)));
+        // Forgotten when as many as are kept have followed.
+        for _ in 0..RECENT {
+            bus.send(1, (ns(1_000), ns(1_100)), &token());
+        }
+        assert!(!bus.is_busy(ns(150), 1) && bus.is_busy(ns(1_050), 1) && bus.is_busy(ns(1_149), 0));
+    }
+
+    #[test]
+    fn behind_a_link_with_jitter_all_hear_a_telegram_at_its_own_delay() {
+        let half_width = Span::from_ns(40);
+        let link = Link { ends: [Place::new(0, Span::ZERO), Place::new(1, Span::ZERO)], delay: Span::from_ns(100) };
+        let tree = Tree::new(2, vec![link]).unwrap();
+        let places = [0, 0, 1, 1].map(|segment| Place::new(segment, Span::ZERO));
+        let mut bus = Bus::new(Delays::new(&tree, &places, &[0]), vec![LinkJitter::new(half_width, 1, "link")]);
+        let mut expected = LinkJitter::new(half_width, 1, "link");
+        let mut strays = Vec::new();
+        for sender in [0, 1, 2].into_iter().cycle().take(300) {
+            let start = ns(strays.len() as i64 * 1_000);
+            let (id, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token());
+            let delay = |listener| bus.arrival(id, listener).0 - bus.flight(id).end;
+            let stray = expected.draw();
+            let behind = Span::from_ns(100) + stray;
+            let all = if sender < 2 {
+                [Span::ZERO, Span::ZERO, behind, behind]
+            } else {
+                [behind, behind, Span::ZERO, Span::ZERO]
+            };
+            assert_eq!([0, 1, 2, 3].map(delay), all);
+            let far = if sender < 2 { 3 } else { 0 };
+            let tick = Span::from_ticks(1);
+            let seen = [start + behind - tick, start + behind, bus.arrival(id, far).0 - tick, bus.arrival(id, far).0];
+            assert_eq!(seen.map(|now| bus.is_busy(now, far)), [false, true, true, false]);
+            bus.add_listeners(id, 1);
+            bus.heard(id);
+            strays.push(stray);
+        }
+        let most = Span::from_ns(36);
+        assert!(strays.iter().any(|&stray| stray > most) && strays.iter().any(|&stray| stray < -most));
     }
 }

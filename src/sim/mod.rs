@@ -12,3 +12,4 @@ pub mod network;
 pub mod noise;
 pub mod queue;
 pub mod record;
+pub mod topology;

@@ -1,18 +1,19 @@
-//! The network: stations on a line, and the one loop that makes time pass.
+//! The network: stations on cables, and the one loop that makes time pass.
 //!
 //! Events are ordered by (time, phase, station, number), see [`queue`](super::queue). A telegram's arrivals have its
 //! number on the line, a station's other events are numbered by this station alone. Only the order of numbers matters,
-//! and each random stream belongs to one station, so that a station more or less changes nothing for the others.
+//! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
 use crate::observation::{self, Observation};
-use crate::sim::bus::{Bus, FlightId, Place};
+use crate::sim::bus::{Bus, FlightId};
 use crate::sim::crystal::Crystal;
 use crate::sim::fault::Disturbance;
 use crate::sim::motion::{Resolution, Shaft};
-use crate::sim::noise::JitterSource;
+use crate::sim::noise::{JitterSource, LinkJitter};
 use crate::sim::queue::{Key, NearQueue, Phase, Queue};
 use crate::sim::record::{Recorder, Stamp, Transmission};
+use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::Address;
 
@@ -21,7 +22,7 @@ use crate::wire::Address;
 pub struct Site<S> {
     /// The machine.
     pub machine: S,
-    /// Where it is on the line.
+    /// Where it is on the cables.
     pub place: Place,
     /// Its crystal.
     pub crystal: Crystal,
@@ -29,6 +30,27 @@ pub struct Site<S> {
     pub shaft: Option<(Shaft, Resolution)>,
     /// When its supply comes on.
     pub powered_at: Time,
+}
+
+/// The cables and what joins them.
+#[derive(Clone, Debug)]
+pub struct Wiring {
+    /// Segments and links.
+    pub tree: Tree,
+    /// The links with jitter, by index, and what each draws.
+    pub jitter: Vec<(usize, LinkJitter)>,
+}
+
+impl Wiring {
+    /// One segment of cable.
+    pub fn line() -> Self {
+        Self { tree: Tree::line(), jitter: Vec::new() }
+    }
+    /// The bus of stations at `places`.
+    fn bus(self, places: &[Place]) -> Bus {
+        let (unsteady, jitter): (Vec<_>, Vec<_>) = self.jitter.into_iter().unzip();
+        Bus::new(Delays::new(&self.tree, places, &unsteady), jitter)
+    }
 }
 
 /// When the scenario orders something.
@@ -84,6 +106,8 @@ struct Slot<S> {
     address: Address,
     filter: Filter,
     powered: bool,
+    /// When its next cycle begins, once that is known.
+    cycle_at: Option<Time>,
     sample_with_telegrams: bool,
     deadlines: [Deadline; Outbox::DEADLINES],
     /// Number of the station's next event other than a telegram.
@@ -109,7 +133,7 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     cycle_acts: Vec<(u64, usize)>,
     next_cycle_act: usize,
     now: Time,
-    /// SYNCH telegrams that the master has sent, lost ones included.
+    /// Cycles that the first station has begun, with a lost SYNCH too.
     clocks: u64,
     out: Outbox,
 }
@@ -119,11 +143,21 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
 pub struct NetworkEvent(Event);
 
 impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
-    /// A network at rest at time zero. Stations are switched on at their own instants.
+    /// The station whose cycles count.
+    const CLOCK: usize = 0;
+
+    /// A network at rest at time zero. Stations are switched on at their own instants. Cycles are those of the first
+    /// station: they end a run, orders are bound to them.
     ///
     /// # Panics
     /// If two stations have one address, or there are more than 127: the caller checks scenarios.
-    pub fn new(rate: BitRate, sites: Vec<Site<S>>, jitter: JitterSource, disturbances: Vec<Disturbance>) -> Self {
+    pub fn new(
+        rate: BitRate,
+        (wiring, sites): (Wiring, Vec<Site<S>>),
+        jitter: JitterSource,
+        disturbances: Vec<Disturbance>,
+    ) -> Self {
+        let places: Vec<_> = sites.iter().map(|site| site.place).collect();
         let mut by_address = [None; 128];
         let mut slots = Vec::with_capacity(sites.len());
         for (index, site) in sites.into_iter().enumerate() {
@@ -137,6 +171,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 address,
                 filter,
                 powered: false,
+                cycle_at: None,
                 sample_with_telegrams: false,
                 deadlines: [Deadline::default(); Outbox::DEADLINES],
                 number: 0,
@@ -148,7 +183,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             by_address,
             curious: Vec::new(),
             neighbours: Vec::new(),
-            bus: Bus::default(),
+            bus: wiring.bus(&places),
             queue: Q::default(),
             jitter,
             disturbances,
@@ -242,11 +277,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Act::PowerOn => {}
             Act::PowerOff => {
                 self.tell(slot, &Observation::Power { on: false }, recorder);
-                let slot = &mut self.slots[slot];
+                let (index, slot) = (slot, &mut self.slots[slot]);
                 slot.powered = false;
+                slot.cycle_at = None;
                 for deadline in &mut slot.deadlines {
                     deadline.due = None;
                 }
+                self.bus.silence(index, self.now);
             }
             Act::Command(command) => self.step(slot, self.local(slot), Input::Command(command), recorder),
         }
@@ -264,7 +301,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let station = &self.slots[slot];
         let sample = if station.sample_with_telegrams { self.raw(slot) } else { 0 };
         let now = self.local(slot);
-        if station.powered {
+        // Without octets it was cut off before it began.
+        if station.powered && !self.bus.flight(id).frame.is_empty() {
             self.out.clear();
             let octets = self.bus.flight(id).frame.octets();
             let input = Input::Telegram(Heard { octets, sample });
@@ -280,7 +318,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.slots[slot].site.shaft.as_ref().map_or(0, |(shaft, resolution)| resolution.raw(shaft.angle(self.now)))
     }
 
+    /// A station's cycle begins. Only those of the first station are the network's.
     fn sent<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
+        if self.slots[slot].cycle_at.take_if(|at| *at == self.now).is_none() {
+            return; // It lost its supply before.
+        }
+        if slot != Self::CLOCK {
+            return self.step(slot, self.local(slot), Input::Sent, recorder);
+        }
         let cycle = self.clocks;
         self.clocks += 1;
         while let Some(&(_, act)) = self.cycle_acts.get(self.next_cycle_act).filter(|&&(due, _)| due <= cycle) {
@@ -304,10 +349,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         deadline.due = None;
         let input = match Timer::ALL.get(which) {
-            Some(&timer) => Input::Deadline {
-                timer,
-                busy: timer == Timer::Slot && self.bus.is_busy(now, self.slots[slot].site.place),
-            },
+            Some(&timer) => Input::Deadline { timer, busy: timer == Timer::Slot && self.bus.is_busy(now, slot) },
             None => Input::Sample(self.raw(slot)),
         };
         self.step(slot, local, input, recorder);
@@ -342,9 +384,18 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 Order::At(at) => Self::arm(&mut self.queue, &mut self.slots[slot], which, at.max(now), self.now),
             }
         }
+        if let Some(at) = self.out.beginning_cycle() {
+            let at = self.slots[slot].site.crystal.to_true(at).max(self.now);
+            self.begin_cycle(slot, at);
+        }
         self.transmit(slot, recorder);
     }
 
+    /// The station's cycle begins at `at`.
+    fn begin_cycle(&mut self, slot: usize, at: Time) {
+        self.slots[slot].cycle_at = Some(at);
+        self.push(at, Phase::Edge, slot, Event::Sent);
+    }
     fn arm(queue: &mut Q, slot: &mut Slot<S>, which: usize, at: Local, now: Time) {
         let due = slot.site.crystal.to_true(at).max(now);
         let deadline = &mut slot.deadlines[which];
@@ -380,7 +431,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             .any(|what| what.loses(self.clocks_begun(send.clock), address, send.clock, frame.octets()));
         if send.clock {
             // The master's transmitter runs, whatever becomes of the telegram.
-            self.push(end, Phase::Edge, slot, Event::Sent);
+            self.begin_cycle(slot, end);
         }
         if lost {
             let how = observation::Disturbance::Lost;
@@ -388,7 +439,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         let Some((_, frame)) = self.out.sending() else { return };
         recorder.telegram(&Transmission { start, end, sender: address, octets: frame.octets() });
-        let (id, hit) = self.bus.send(slot, self.slots[slot].site.place, (start, end), frame);
+        let (id, hit) = self.bus.send(slot, (start, end), frame);
         if let Some(with) = hit {
             self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
         }
@@ -426,14 +477,20 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         true
     }
     /// A request for all passes every filter. Only the nearest neighbour is told now and tells the next one when it has
-    /// heard, so that the queue holds one event of the telegram, not one for each station.
+    /// heard, so that the queue holds one event of the telegram, not one for each station. Where links have jitter, who
+    /// is nearest differs from telegram to telegram, and all are told now.
     fn broadcast(&mut self, sender: usize, id: FlightId) {
-        match self.neighbours[sender].len() {
-            0 => self.bus.unheard(id),
-            count => {
-                self.bus.add_listeners(id, count as u16);
-                self.tell_neighbour(id, 0);
-            }
+        let count = self.neighbours[sender].len();
+        match count {
+            0 => return self.bus.unheard(id),
+            count => self.bus.add_listeners(id, count as u16),
+        }
+        if self.bus.delays().is_steady() {
+            return self.tell_neighbour(id, 0);
+        }
+        for rank in 0..count {
+            let listener = self.neighbours[sender][rank].into();
+            self.push_telegram(listener, id, Event::Telegram(id));
         }
     }
     fn tell_neighbour(&mut self, id: FlightId, rank: u8) {
@@ -443,19 +500,16 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// The telegram's end reaches `listener`. Of telegrams that end there at one instant the one sent first comes first.
     fn push_telegram(&mut self, listener: usize, id: FlightId, event: Event) {
-        let flight = self.bus.flight(id);
-        let listener = &self.slots[listener];
-        let at = flight.end + listener.site.place.delay(self.slots[flight.sender].site.place);
-        let key = Key::new(at, Phase::Telegram, listener.address.get(), flight.number);
+        let (at, number) = self.bus.arrival(id, listener);
+        let key = Key::new(at, Phase::Telegram, self.slots[listener].address.get(), number);
         self.queue.push(key, NetworkEvent(event));
     }
     /// All but `sender`, by delay and then by address, as events are ordered.
     fn neighbours_of(&self, sender: usize) -> Vec<u8> {
-        let place = self.slots[sender].site.place;
         let mut all: Vec<u8> = (0..self.slots.len() as u8).filter(|&slot| usize::from(slot) != sender).collect();
         all.sort_by_key(|&slot| {
-            let slot = &self.slots[usize::from(slot)];
-            (slot.site.place.delay(place), slot.address)
+            let slot = usize::from(slot);
+            (self.bus.delays().nominal(sender, slot), self.slots[slot].address)
         });
         all
     }

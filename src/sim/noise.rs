@@ -1,8 +1,9 @@
 //! Noise: random streams with names, the distributions drawn from them, and the jitter of the master's clock.
 //!
 //! Every draw belongs to (seed, station, purpose): the three are written side by side into the key of a ChaCha8
-//! generator, so adding a station, a metric or a trace leaves all other draws as they are. The distributions are our
-//! own few lines, in integers, `sqrt` and `libm` alone: each value is the same on every machine and in every release.
+//! generator, so adding a station, a metric or a trace leaves all other draws as they are. A link between segments takes
+//! a station's place by its name. The distributions are our own few lines, in integers, `sqrt` and `libm` alone: each
+//! value is the same on every machine and in every release.
 
 use crate::time::Span;
 use rand::{Rng, SeedableRng};
@@ -61,6 +62,8 @@ purposes! {
     Shaft = b"shaftpos";
     /// Acyclic requests of the master.
     Acyclic = b"acyclic-";
+    /// What a repeater's delay strays by, telegram by telegram.
+    Repeater = b"repeater";
 }
 
 /// A random stream: the draws of one station for one purpose.
@@ -78,6 +81,24 @@ impl Stream {
         let mut key = [0; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
         key[8] = station;
+        key[16..24].copy_from_slice(&purpose.key());
+        key[24..].copy_from_slice(&KEY_DOMAIN);
+        Self { words: ChaCha8Rng::from_seed(key) }
+    }
+    /// The stream of (`seed`, the link called `link`, `purpose`), at its beginning.
+    ///
+    /// The name stands where a station has its address: 127, which no station has, and 56 bits of its FNV-1a hash
+    /// (Fowler, Noll and Vo).
+    pub fn of_link(seed: u64, link: &str, purpose: Purpose) -> Self {
+        /// No station's address.
+        const NO_STATION: u8 = 127;
+        let hash = link
+            .bytes()
+            .fold(0xcbf2_9ce4_8422_2325, |hash: u64, octet| (hash ^ u64::from(octet)).wrapping_mul(0x0100_0000_01b3));
+        let mut key = [0; 32];
+        key[..8].copy_from_slice(&seed.to_le_bytes());
+        key[8] = NO_STATION;
+        key[9..16].copy_from_slice(&hash.to_le_bytes()[..7]);
         key[16..24].copy_from_slice(&purpose.key());
         key[24..].copy_from_slice(&KEY_DOMAIN);
         Self { words: ChaCha8Rng::from_seed(key) }
@@ -314,6 +335,31 @@ impl JitterSource {
     }
 }
 
+/// The jitter of one link between segments, telegram by telegram.
+///
+/// Model: each telegram strays by itself, equally likely anywhere within the half width, because a repeater samples what
+/// it hears on a clock of its own that has nothing to do with the sender's.
+#[derive(Clone, Debug)]
+pub struct LinkJitter {
+    half_width: Span,
+    stream: Stream,
+}
+
+impl LinkJitter {
+    /// The jitter of the link called `link` in a run with `seed`.
+    ///
+    /// # Panics
+    /// If `half_width` is negative.
+    pub fn new(half_width: Span, seed: u64, link: &str) -> Self {
+        assert!(half_width >= Span::ZERO, "half width {half_width} is negative");
+        Self { half_width, stream: Stream::of_link(seed, link, Purpose::Repeater) }
+    }
+    /// How much later than nominal the next telegram leaves the link. Signed.
+    pub fn draw(&mut self) -> Span {
+        self.stream.uniform(self.half_width)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -397,6 +443,23 @@ mod tests {
                 seen.push(these);
             }
         }
+    }
+
+    #[test]
+    fn links_have_streams_by_name_that_no_station_has() {
+        let draws = |mut stream: Stream| [(); 4].map(|()| stream.below(u64::MAX));
+        let of = |name| draws(Stream::of_link(SEED, name, Purpose::Repeater));
+        let mut seen: Vec<_> = (0..=127).map(|number| draws(stream(number, Purpose::Repeater))).collect();
+        for name in ["", "a", "b", "ab", "ba", "hall 1 - hall 2"] {
+            assert_eq!(of(name), of(name));
+            assert!(seen.iter().flatten().all(|word| !of(name).contains(word)), "{name}");
+            seen.push(of(name));
+        }
+        assert_ne!(draws(Stream::of_link(SEED + 1, "a", Purpose::Repeater)), of("a"));
+        let mut jitter = LinkJitter::new(US, SEED, "a");
+        let strays: Vec<i64> = (0..10_000).map(|_| jitter.draw().ticks()).collect();
+        assert!(strays.iter().all(|t| t.abs() <= US.ticks()) && strays.iter().any(|t| t.abs() > US.ticks() * 99 / 100));
+        assert_eq!(LinkJitter::new(Span::ZERO, SEED, "a").draw(), Span::ZERO);
     }
 
     #[test]

@@ -5,27 +5,31 @@ use crate::device::drive::{Drive, Subscriber};
 use crate::device::encoder::{Disc, Encoder};
 use crate::device::node::{Command, Node};
 use crate::device::options::Resolution;
-use crate::device::unit::UnitSettings;
+use crate::device::tool::{self, Tool};
+use crate::device::unit::{self, UnitSettings};
+use crate::dp::CLOCK_GROUP;
+use crate::dp::class2::{self, Class2};
 use crate::dp::handler::SlaveParams;
 use crate::dp::iso::Rearm;
-use crate::dp::master::{Master, Settings};
+use crate::dp::master::{Master, Pace, Settings};
+use crate::dp::ms2::{self, client};
 use crate::observation::MasterMode;
-use crate::sim::bus::Place;
 use crate::sim::crystal::Crystal;
 use crate::sim::motion::{self, Shaft};
-use crate::sim::network::{self, Act, Network, NetworkEvent, Site};
-use crate::sim::noise::{JitterSource, Purpose, Stream};
+use crate::sim::network::{self, Act, Network, NetworkEvent, Site, Wiring};
+use crate::sim::noise::{JitterSource, LinkJitter, Purpose, Stream};
 use crate::sim::queue::Queue;
-use crate::study::plan::Plan;
-use crate::study::scenario::{self, Action, CodeSequence, Scenario, Slave, When};
+use crate::sim::topology::Place;
+use crate::study::plan::{self, Plan};
+use crate::study::scenario::{self, Action, Class1, CodeSequence, Scenario, Slave, When};
 use crate::time::{Local, Span, Time};
 use crate::wire::Address;
 use crate::wire::drive::G1Stw;
 use crate::wire::parameter::ParameterAddress;
-use crate::wire::prm::{DpV1Status, DxbLink, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81};
+use crate::wire::prm::{
+    DpV1Status, DxbLink, DxbSubscription, EncoderOptions, IsoM, PrmBuilder, SetPrm, StationStatus, UserPrm81,
+};
 
-/// Group 8, the clock's (Set_Prm octet 7).
-const CLOCK_GROUP: u8 = 0x80;
 /// A station's clock shows anything up to this when the run begins: clocks need not agree.
 const CLOCK_START: Span = Span::from_s(1);
 /// Data_Control_Time, where the master's watchdog does not set it.
@@ -39,27 +43,49 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
     let bus = &scenario.bus.params;
     let publisher = scenario.publishes(slave.address);
     // A publisher's listeners need the time of an idle line (Model: D27).
-    let min_tsdr = if publisher { bus.t_id1() } else { bus.min_tsdr };
-    let watchdog = scenario.master.watchdog;
+    let min_tsdr = plan::min_tsdr(bus, publisher);
+    let owner = scenario.class1(slave.master);
+    let watchdog = owner.map_or(scenario.master.watchdog, |class1| class1.watchdog);
+    let clocked = scenario.is_clocked(slave);
+    let services = slave.services;
     let prm = SetPrm {
-        status: (StationStatus::LOCK).with(StationStatus::WD_ON, watchdog.is_some()),
+        status: (StationStatus::LOCK)
+            .with(StationStatus::SYNC, services.sync)
+            .with(StationStatus::FREEZE, services.freeze)
+            .with(StationStatus::WD_ON, watchdog.is_some()),
         wd_fact_1: watchdog.map_or(1, |watchdog| watchdog.factor_1),
         wd_fact_2: watchdog.map_or(1, |watchdog| watchdog.factor_2),
-        min_tsdr: min_tsdr.0 as u8,
+        min_tsdr: min_tsdr.0.min(u8::MAX.into()) as u8,
         ident: slave.device.ident,
-        group: CLOCK_GROUP,
-        dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::ISOM_REQ | DpV1Status::PRM_STRUCTURE)
+        group: if clocked { CLOCK_GROUP } else { 0 } | services.groups,
+        dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::PRM_STRUCTURE)
+            .with(DpV1Status::ISOM_REQ, clocked)
             .with(DpV1Status::FAIL_SAFE, slave.device.fail_safe)
-            .with(DpV1Status::PUBLISHER_ENABLE, publisher),
-        blocks: &[],
+            .with(DpV1Status::PUBLISHER_ENABLE, publisher)
+            | preset_status(slave),
+        blocks: preset_blocks(slave),
     };
     let builder = PrmBuilder::new(&prm).and_then(|builder| {
-        let builder = if slave.device.subscriber { Some(builder) } else { builder.user_81(&user_block(slave)) }?;
-        let builder = builder.iso_m(&iso_block(scenario, slave))?;
-        let links = links_to(scenario, slave.address);
-        if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }
+        let own = !slave.device.subscriber && preset_blocks(slave).is_empty();
+        let builder = if own { builder.user_81(&user_block(slave)) } else { Some(builder) }?;
+        let builder = if clocked { builder.iso_m(&iso_block(scenario, slave))? } else { builder };
+        let (links, subscriptions) = tables_of(scenario, slave.address);
+        let builder = if links.is_empty() { Some(builder) } else { builder.dxb_links(&links) }?;
+        if subscriptions.is_empty() { Some(builder) } else { builder.dxb_subscriptions(&subscriptions) }
     });
     builder.expect("a checked scenario fits into Set_Prm").octets().to_vec()
+}
+
+/// DPV1_Status as a GSD file presets it, without what the configuration tool decides and what is reserved.
+fn preset_status(slave: &Slave) -> DpV1Status {
+    let preset = slave.user_prm.first_chunk().map_or(DpV1Status::default(), |&octets| DpV1Status::from_octets(octets));
+    let [_, check_cfg_mode, _] = DpV1Status::CHECK_CFG_MODE.octets();
+    let [_, octet_9, _] = preset.octets();
+    DpV1Status::from_octets([0, preset.alarms() | octet_9 & check_cfg_mode, preset.alarm_mode()])
+}
+/// The blocks of a GSD file's user parameters.
+fn preset_blocks(slave: &Slave) -> &[u8] {
+    slave.user_prm.get(3..).unwrap_or_default()
 }
 
 fn user_block(slave: &Slave) -> UserPrm81 {
@@ -81,34 +107,40 @@ fn user_block(slave: &Slave) -> UserPrm81 {
 }
 
 fn iso_block(scenario: &Scenario, slave: &Slave) -> IsoM {
-    let device = slave.device;
+    let device = &slave.device;
     let units = |span: Span| (span.ticks() / Span::TICKS_PER_ISO_UNIT) as u32;
+    // Only a network to plan has longer ones.
+    let short = |units: u32| units.min(u16::MAX.into()) as u16;
     let t_dx = Plan::of(scenario).t_dx_told();
     IsoM {
         version: 1,
         t_base_dp: device.t_base_dp,
-        t_dp: (units(scenario.master.t_dp) / device.t_base_dp) as u16,
+        t_dp: short(units(scenario.master.t_dp) / device.t_base_dp),
         t_mapc: scenario.master.t_mapc,
         t_base_io: device.t_base_io,
-        t_i: (units(slave.times.t_i) / device.t_base_io) as u16,
-        t_o: (units(slave.times.t_o) / device.t_base_io) as u16,
+        t_i: short(units(slave.times.t_i) / device.t_base_io),
+        t_o: short(units(slave.times.t_o) / device.t_base_io),
         t_dx: units(t_dx),
-        t_pll_w: units(slave.times.t_pll_w) as u16,
-        t_pll_d: units(slave.times.t_pll_d) as u16,
+        t_pll_w: short(units(slave.times.t_pll_w)),
+        t_pll_d: short(units(slave.times.t_pll_d)),
     }
 }
 
-fn links_to(scenario: &Scenario, subscriber: Address) -> Vec<DxbLink> {
-    let links = scenario.links.iter().filter(|link| link.subscriber == subscriber);
-    let inputs = |publisher| scenario.slave(publisher).map_or(0, |slave| slave.device.inputs);
-    links
-        .map(|link| DxbLink {
-            publisher: link.publisher.get(),
-            length: inputs(link.publisher),
-            offset: link.offset,
-            sample: link.length,
-        })
-        .collect()
+/// The entries that `subscriber` gets: those of the link table and those of the subscriber table.
+fn tables_of(scenario: &Scenario, subscriber: Address) -> (Vec<DxbLink>, Vec<DxbSubscription>) {
+    let (mut links, mut subscriptions) = (Vec::new(), Vec::new());
+    for link in scenario.links.iter().filter(|link| link.subscriber == subscriber) {
+        let inputs = scenario.slave(link.publisher).map_or(0, |slave| slave.device.inputs);
+        let (publisher, length) = (link.publisher.get(), link.publisher_length.unwrap_or(inputs));
+        for sample in &link.samples {
+            let entry = DxbLink { publisher, length, offset: sample.offset, sample: sample.length };
+            match link.slot() {
+                None => links.push(entry),
+                Some(slot) => subscriptions.push(DxbSubscription { link: entry, slot, destination: sample.to }),
+            }
+        }
+    }
+    (links, subscriptions)
 }
 
 /// What the master knows of a slave beforehand.
@@ -121,7 +153,9 @@ pub fn slave_params(scenario: &Scenario, slave: &Slave) -> SlaveParams {
         inputs: slave.device.inputs,
         publisher: scenario.publishes(slave.address),
         fail_safe: slave.device.fail_safe,
-        get_cfg: scenario.master.get_cfg,
+        get_cfg: scenario.class1(slave.master).map_or(scenario.master.get_cfg, |class1| class1.get_cfg),
+        max_diag: slave.device.max_diag,
+        min_interval: slave.min_slave_interval(),
     }
 }
 
@@ -134,45 +168,101 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     let master = scenario.master;
     let mut sites = vec![Site {
         machine: Node::Master(master_of(scenario)),
-        place: Place::at(master.position_mm),
+        place: place(scenario, master.address),
         crystal: crystal(seed, master.address, master.crystal),
         shaft: None,
-        powered_at: Time::ZERO,
+        powered_at: Time::ZERO + master.powered_at,
     }];
+    sites.extend(scenario.class1.iter().map(|class1| Site {
+        machine: Node::Master(further_master(scenario, class1)),
+        place: place(scenario, class1.address),
+        crystal: crystal(seed, class1.address, class1.crystal),
+        shaft: None,
+        powered_at: Time::ZERO + class1.powered_at,
+    }));
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
+    sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
-    let mut network = Network::new(scenario.bus.params.rate, sites, jitter, scenario.disturbances.clone());
+    let mut network =
+        Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, scenario.disturbances.clone());
     for event in &scenario.events {
         let when = match event.when {
             When::Time(span) => network::When::Time(Time::ZERO + span),
             When::Cycle(cycle) => network::When::Cycle(cycle),
         };
-        for &(station, act) in &acts(master.address, &event.slaves, event.action) {
+        for &(station, act) in &acts(scenario, &event.slaves, event.action) {
             network.order(when, station, act);
         }
     }
     network
 }
 
+/// The cables; every repeater with jitter has its own draws, by its name.
+fn wiring(scenario: &Scenario) -> Wiring {
+    let repeaters = scenario.topology.repeaters().iter().enumerate();
+    let jitter = repeaters.filter(|(_, repeater)| repeater.jitter > Span::ZERO);
+    let jitter = jitter.map(|(i, repeater)| (i, LinkJitter::new(repeater.jitter, scenario.run.seed, &repeater.name)));
+    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect() }
+}
+
+/// Where a station is.
+fn place(scenario: &Scenario, station: Address) -> Place {
+    scenario.topology.place(scenario.point(station).expect("a station of the scenario"))
+}
+
 fn master_of(scenario: &Scenario) -> Master<Controller> {
     let master = &scenario.master;
     // A station that is no slave to the master is not in its list.
-    let slaves: Vec<&Slave> = scenario.slaves.iter().filter(|slave| !slave.silent).collect();
+    let slaves: Vec<&Slave> = scenario.configured().collect();
     let settings = Settings {
         address: master.address,
         bus: scenario.bus.params,
         t_dp: master.t_dp,
+        pace: master.pace,
+        shared: !scenario.class1.is_empty() || !scenario.class2.is_empty(),
         rearm: if master.accumulate { Rearm::LastSent } else { Rearm::Grid },
         dx_retries: master.dx_retries,
         lost_after: master.lost_after.min(u16::MAX.into()) as u16,
         clear_for: master.clear_for,
         active_spare: master.active_spare,
-        data_control_time: master.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
+        data_control_time: data_control_time(master),
+        auto_clear: master.services.auto_clear,
+        ms1_timeout: master.ms1_timeout,
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
     let life = LifeSettings { t_mapc: master.t_mapc, start: master.life_start, delay: master.life_delay };
     let addresses = slaves.iter().map(|slave| slave.address);
     Master::new(settings, Controller::new(addresses, life))
+}
+
+/// A free-running master beside `[master]`.
+fn further_master(scenario: &Scenario, class1: &Class1) -> Master<Controller> {
+    let slaves: Vec<&Slave> = scenario.slaves_of(class1.address).collect();
+    let settings = Settings {
+        address: class1.address,
+        bus: scenario.bus.params,
+        // What it is for is the pace of Global_Control.
+        t_dp: class1.least_cycle.max(Span::from_ms(1)),
+        pace: Pace::Free { least: class1.least_cycle },
+        shared: true,
+        rearm: Rearm::Grid,
+        dx_retries: class1.dx_retries,
+        lost_after: class1.lost_after.min(u16::MAX.into()) as u16,
+        clear_for: class1.clear_for,
+        active_spare: false,
+        data_control_time: class1.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
+        auto_clear: false,
+        ms1_timeout: scenario.master.ms1_timeout,
+        slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
+    };
+    let life = LifeSettings { t_mapc: 1, start: 1, delay: 0 };
+    Master::new(settings, Controller::new(slaves.iter().map(|slave| slave.address), life))
+}
+
+/// The scenario's, else the time after which slaves without a master clear their outputs, so that both sides agree.
+fn data_control_time(master: &scenario::Master) -> Span {
+    let watchdog = || master.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span);
+    master.services.data_control_time.unwrap_or_else(watchdog)
 }
 
 fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
@@ -183,19 +273,52 @@ fn site(scenario: &Scenario, slave: &Slave) -> Site<Node> {
     let machine = if slave.silent {
         Node::Silent(slave.address)
     } else if slave.device.subscriber {
-        Node::Drive(Drive::new(slave.device, settings, Subscriber::default()))
+        Node::Drive(Drive::new(&slave.device, settings, Subscriber::new(&slave.device, slave.address)))
     } else {
-        Node::Encoder(Encoder::new(slave.device, settings, Disc::new(slave.device, &slave.options)))
+        Node::Encoder(Encoder::new(&slave.device, settings, Disc::new(&slave.device, &slave.options)))
     };
     let Resolution { steps_per_rev, revolutions } = slave.resolution();
     let resolution = motion::Resolution::new(steps_per_rev, revolutions);
     let shaft = Shaft::new(&slave.motion).expect("a checked motion");
     Site {
         machine,
-        place: Place::at(slave.position_mm),
+        place: place(scenario, slave.address),
         crystal: crystal(scenario.run.seed, slave.address, slave.crystal),
         shaft: Some((shaft, resolution.expect("a checked resolution"))),
         powered_at: Time::ZERO + slave.powered_at,
+    }
+}
+
+/// A class 2 master with its jobs.
+fn class2_site(scenario: &Scenario, class2: &scenario::Class2) -> Site<Node> {
+    let bus = scenario.bus.params;
+    let mut slaves: Vec<Address> = class2.jobs.iter().flat_map(|job| job.slaves.iter().copied()).collect();
+    slaves.sort_unstable();
+    slaves.dedup();
+    let jobs = class2.jobs.iter().flat_map(|job| {
+        let pairs = job.works.iter().flat_map(|work| job.slaves.iter().map(move |slave| (work, slave)));
+        pairs.map(|(work, slave)| tool::Job {
+            slave: slaves.binary_search(slave).expect("a slave of a job"),
+            work: work.clone(),
+            start: job.start,
+            period: job.period,
+        })
+    });
+    let jobs = jobs.collect();
+    let shortest = ms2::TIMEOUT_UNIT * i64::from(ms2::send_timeout(bus.rate));
+    let ms2 = client::Settings {
+        send_timeout: class2.send_timeout.unwrap_or(shortest).div_floor(ms2::TIMEOUT_UNIT) as u16,
+        response_timeout: class2.response_timeout,
+        profile_ident: unit::PROFILE_IDENT,
+    };
+    let settings =
+        class2::Settings { address: class2.address, bus, ms2, per_token: class2.per_token, slaves: slaves.clone() };
+    Site {
+        machine: Node::Class2(Class2::new(settings, Tool::new(slaves, jobs))),
+        place: place(scenario, class2.address),
+        crystal: crystal(scenario.run.seed, class2.address, class2.crystal),
+        shaft: None,
+        powered_at: Time::ZERO + class2.powered_at,
     }
 }
 
@@ -214,10 +337,12 @@ fn crystal(seed: u64, station: Address, crystal: scenario::Crystal) -> Crystal {
 }
 
 /// An action as orders to stations.
-fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Act<Command>)> {
+fn acts(scenario: &Scenario, slaves: &[Address], action: Action) -> Vec<(Address, Act<Command>)> {
+    let master = scenario.master.address;
+    let owner = |slave| scenario.slave(slave).map_or(master, |slave| slave.master);
     let to_slaves = |act: Act<Command>| slaves.iter().map(|&slave| (slave, act)).collect();
     let for_slaves = |order: &dyn Fn(Address) -> controller::Command| {
-        slaves.iter().map(|&slave| (master, Act::Command(Command::Application(order(slave))))).collect()
+        slaves.iter().map(|&slave| (owner(slave), Act::Command(Command::Application(order(slave))))).collect()
     };
     match action {
         Action::PowerOff => to_slaves(Act::PowerOff),
@@ -232,10 +357,11 @@ fn acts(master: Address, slaves: &[Address], action: Action) -> Vec<(Address, Ac
             controller::Command::ChangeParameter(slave, address, format, value)
         }),
         Action::Startup { telegram, patch } => {
-            slaves.iter().map(|&slave| (master, Act::Command(Command::Patch(slave, telegram, patch)))).collect()
+            slaves.iter().map(|&slave| (owner(slave), Act::Command(Command::Patch(slave, telegram, patch)))).collect()
         }
         Action::Clear => vec![(master, Act::Command(Command::Mode(MasterMode::Clear)))],
         Action::Operate => vec![(master, Act::Command(Command::Mode(MasterMode::Operate)))],
+        Action::Control(control) => vec![(master, Act::Command(Command::Control(control)))],
         Action::Acknowledge => for_slaves(&controller::Command::Acknowledge),
         Action::HoldLifeSign { cycles } => for_slaves(&|slave| controller::Command::HoldLife(slave, cycles)),
         Action::ReleaseLifeSign => for_slaves(&controller::Command::ReleaseLife),
@@ -297,5 +423,34 @@ mod tests {
         assert_eq!((publisher[3], publisher[7]), (76, 0xE0), "min T_SDR is T_ID1, Publisher_Enable is set");
         let subscriber = set_prm(&four, &four.slaves[3]);
         assert_eq!(subscriber[10 + IsoM::LEN..], octets("09 03 00 00 01 06 0C 04 04"));
+    }
+
+    #[test]
+    fn a_subscriber_gets_both_tables_with_all_samples() {
+        let more = r#"
+            table = "subscriber"
+            [[link]]
+            publisher = 7
+            subscriber = 9
+            samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]
+            [[link]]
+            publisher = 7
+            subscriber = 9
+            table = "subscriber"
+            slot = 2
+            samples = [{ offset = 8, length = 4, to = 6 }, { offset = 2, length = 2 }]
+            [[link]]
+            publisher = 8
+            subscriber = 9
+            publisher_length = 10
+        "#;
+        let text = [THREE, LINK, more].concat().replace("375 us", "500 us");
+        let four = Scenario::parse("four", "four.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let subscriber = set_prm(&four, &four.slaves[3]);
+        let expected = octets(
+            "11 03 00 00 01 07 0C 04 04 07 0C 00 02 08 0A 04 04 \
+             17 07 00 00 01 06 0C 04 01 00 04 07 0C 08 02 06 04 07 0C 02 02 0A 02",
+        );
+        assert_eq!(subscriber[10 + IsoM::LEN..], expected);
     }
 }

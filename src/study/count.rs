@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use super::acyclic::AcyclicCounts;
 use super::layout::Layout;
-use crate::observation::{ClockVerdict, Leds, Observation, Phase, PllState, SlaveState};
+use super::live_list::{CycleTimes, LiveList};
+use crate::observation::{ClockVerdict, Leds, LinkState, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -14,6 +16,12 @@ pub struct Counts {
     pub network: NetworkCounts,
     /// Per slave, in address order.
     pub slaves: Vec<SlaveCounts>,
+    /// Per link, in the order of the layout.
+    pub links: Vec<LinkCounts>,
+    /// Acyclic services, by the class of the master.
+    pub acyclic: AcyclicCounts,
+    /// Per address, as a bus analyser counts.
+    pub live_list: LiveList,
 }
 
 /// What is counted for the network as a whole.
@@ -23,12 +31,24 @@ pub struct NetworkCounts {
     pub duration: Span,
     /// Cycles that began.
     pub cycles: u64,
+    /// How long they took.
+    pub cycle_times: CycleTimes,
     /// Requests that the master repeated.
     pub retries: u64,
     /// Requests that stayed without answer after all retries.
     pub no_answers: u64,
+    /// Times that slaves asked for Slave_Diag during data exchange (DH).
+    pub diagnoses: u64,
+    /// Times that the master went back to Clear on its own.
+    pub auto_clears: u64,
     /// SYNCHs that could not be sent when planned.
     pub late_clocks: u64,
+    /// The latest of them.
+    pub latest_clock: Span,
+    /// SYNCHs that were left out because the token was away.
+    pub missed_clocks: u64,
+    /// How long the token took to come round to the master.
+    pub rotation: Rotation,
     /// Tokens claimed after silence, the first one of a run included.
     pub tokens_claimed: u64,
     /// Telegrams that overlapped with another one.
@@ -39,6 +59,31 @@ pub struct NetworkCounts {
     pub events: u64,
     /// Largest latch skew in counts \[steps\]; none if there was no skew.
     pub skew_counts: Option<f64>,
+}
+
+/// T_RR, the time from token to token, of a master in a ring.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Rotation {
+    /// Rotations.
+    pub count: u64,
+    /// The shortest; zero without rotations.
+    pub min: Span,
+    /// The longest.
+    pub max: Span,
+    total: Span,
+}
+
+impl Rotation {
+    fn add(&mut self, t_rr: Span) {
+        self.min = if self.count == 0 { t_rr } else { self.min.min(t_rr) };
+        self.max = self.max.max(t_rr);
+        self.total += t_rr;
+        self.count += 1;
+    }
+    /// The mean; none without rotations.
+    pub fn mean(&self) -> Option<Span> {
+        (self.count > 0).then(|| Span::from_ticks(self.total.ticks() / self.count as i64))
+    }
 }
 
 /// What is counted for one slave.
@@ -70,10 +115,43 @@ pub struct SlaveCounts {
     pub retries: u64,
     /// Requests to this slave without answer after all retries.
     pub no_answers: u64,
+    /// Times that this slave asked for Slave_Diag during data exchange (DH).
+    pub diagnoses: u64,
     /// The first SYNCH that the clock recovery took, as true instant and number of begun cycles.
     first: Option<(Time, u64)>,
     /// When the present phase was entered.
     since: Time,
+}
+
+/// What is counted for one slave-to-slave link.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct LinkCounts {
+    /// Valid receptions.
+    pub valid: u64,
+    /// How often nothing came for the watchdog time (Model: D27).
+    pub lost: u64,
+    /// Data of another length than parameterised.
+    pub length_errors: u64,
+    /// Longest true time between two valid receptions; none before the second.
+    pub longest_gap: Option<Span>,
+    /// The last valid reception.
+    last: Option<Time>,
+}
+
+impl LinkCounts {
+    /// Counts what the subscriber observed of this link at `at`.
+    pub(super) fn observe(&mut self, at: Time, what: &Observation) {
+        match *what {
+            Observation::Subscribed { .. } => {
+                self.valid += 1;
+                let gap = self.last.replace(at).map(|last| at - last);
+                self.longest_gap = self.longest_gap.max(gap);
+            }
+            Observation::WrongLength { .. } => self.length_errors += 1,
+            Observation::Link { to: LinkState::Lost, .. } => self.lost += 1,
+            _ => {}
+        }
+    }
 }
 
 /// From the first SYNCH that a slave's clock recovery took to its lock.
@@ -89,7 +167,13 @@ impl Counts {
     /// Nothing counted yet.
     pub fn new(layout: &Layout) -> Self {
         let slaves = layout.slaves().iter().map(|slave| SlaveCounts::new(slave.address)).collect();
-        Self { network: NetworkCounts::default(), slaves }
+        Self {
+            network: NetworkCounts::default(),
+            slaves,
+            links: vec![LinkCounts::default(); layout.links().len()],
+            acyclic: AcyclicCounts::default(),
+            live_list: LiveList::new(layout),
+        }
     }
 
     /// Counts what the master observed; `index` finds a slave.
@@ -97,7 +181,19 @@ impl Counts {
         let slave = |address| layout.slave(address);
         match *what {
             Observation::CycleStart { .. } => self.network.cycles += 1,
-            Observation::ClockLate { .. } => self.network.late_clocks += 1,
+            Observation::ClockLate { by } => {
+                self.network.late_clocks += 1;
+                self.network.latest_clock = self.network.latest_clock.max(by);
+            }
+            Observation::SynchMissed { cycles } => self.network.missed_clocks += cycles,
+            Observation::TokenReceived { t_rr, .. } if t_rr > Span::ZERO => self.network.rotation.add(t_rr),
+            Observation::AutoClear { .. } => self.network.auto_clears += 1,
+            Observation::DiagnosisDue { slave: address } => {
+                self.network.diagnoses += 1;
+                if let Some(index) = slave(address) {
+                    self.slaves[index].diagnoses += 1;
+                }
+            }
             Observation::TokenClaimed => self.network.tokens_claimed += 1,
             Observation::Retry { slave: address } => {
                 self.network.retries += 1;
@@ -115,13 +211,15 @@ impl Counts {
         }
     }
 
-    /// Counts what any station observed.
-    pub(super) fn station(&mut self, what: &Observation) {
+    /// Counts what any station, `observer`, observed.
+    pub(super) fn station(&mut self, observer: Address, what: &Observation) {
+        self.live_list.observe(observer, what);
         match what {
             Observation::Collision { .. } => self.network.collisions += 1,
             Observation::Disturbed { .. } => self.network.disturbed += 1,
             _ => {}
         }
+        self.acyclic.station(what);
         self.network.events += u64::from(what.is_event());
     }
 
@@ -151,6 +249,7 @@ impl SlaveCounts {
             phases: [Span::ZERO; Phase::ALL.len()],
             retries: 0,
             no_answers: 0,
+            diagnoses: 0,
             first: None,
             since: Time::ZERO,
         }

@@ -3,7 +3,7 @@
 use super::report::aligned;
 use super::scenario::suggestion;
 use crate::device::parameters::{PARAMETERS, Parameter};
-use crate::device::profile::{self, PROFILES, Profile};
+use crate::device::profile::{self, DxbLimits, PROFILES, Profile};
 use crate::time::{BitRate, Span};
 use crate::wire::parameter;
 
@@ -23,16 +23,17 @@ pub fn list() -> String {
     let mut lines = aligned(&header, &[0, 9], &rows);
 
     let answers =
-        |profile: &Profile| std::iter::once(profile.name.to_owned()).chain(max_tsdr(profile)).collect::<Vec<_>>();
+        |profile: &Profile| std::iter::once(profile.name.to_string()).chain(max_tsdr(profile)).collect::<Vec<_>>();
     let header: Vec<_> = std::iter::once("MaxTsdr [t_bit]").chain(rates()).collect();
     lines.push(String::new());
     lines.extend(aligned(&header, &[0], &PROFILES.iter().map(answers).collect::<Vec<_>>()));
 
     lines.push(String::new());
-    let titles = |profile: &Profile| vec![profile.name.to_owned(), profile.title.to_owned()];
+    let titles = |profile: &Profile| vec![profile.name.to_string(), profile.title.to_string()];
     lines.extend(aligned(&["name", "what it is"], &[0, 1], &PROFILES.iter().map(titles).collect::<Vec<_>>()));
     lines.push(String::new());
     lines.push("in, out: octets; rates in bit/s; everything about one device: isodp devices NAME".to_owned());
+    lines.push("others come from GSD files, device = { gsd = \"FILE\" }; what one says: isodp gsd FILE".to_owned());
     text(&lines)
 }
 
@@ -42,7 +43,7 @@ pub fn list() -> String {
 /// There is no such device.
 pub fn full(name: &str) -> Result<String, UnknownDevice> {
     let Some(profile) = profile::find(name) else {
-        let help = suggestion(name, PROFILES.iter().map(|profile| profile.name));
+        let help = suggestion(name, PROFILES.iter().map(|profile| &*profile.name));
         return Err(UnknownDevice { name: name.chars().take(40).collect(), help });
     };
     let mut lines = vec![format!("{}: {}", profile.name, profile.title), String::new()];
@@ -53,12 +54,12 @@ pub fn full(name: &str) -> Result<String, UnknownDevice> {
     lines.extend(aligned(&rates().collect::<Vec<_>>(), &[], &[max_tsdr(profile).collect()]));
 
     lines.push(String::new());
-    if profile.publisher {
+    if profile.subscriber {
+        lines.push("no acyclic parameters".to_owned());
+    } else {
         lines.push("acyclic parameters, all read-only (manual 4)".to_owned());
         let rows: Vec<_> = PARAMETERS.iter().flat_map(parameter_rows).collect();
         lines.extend(aligned(&["number", "name", "format"], &[0, 1, 2], &rows));
-    } else {
-        lines.push("no acyclic parameters".to_owned());
     }
     Ok(text(&lines))
 }
@@ -74,7 +75,7 @@ fn max_tsdr(profile: &Profile) -> impl Iterator<Item = String> {
 
 fn limits(profile: &Profile) -> Vec<String> {
     vec![
-        profile.name.to_owned(),
+        profile.name.to_string(),
         format!("{:04X}", profile.ident),
         profile.inputs.to_string(),
         profile.outputs.to_string(),
@@ -89,11 +90,19 @@ fn limits(profile: &Profile) -> Vec<String> {
 
 const fn function(profile: &Profile) -> &'static str {
     match (profile.publisher, profile.subscriber) {
-        (true, true) => "publisher, subscriber",
+        (true, true) => "publisher/subscriber",
         (true, false) => "publisher",
         (false, true) => "subscriber",
         (false, false) => "-",
     }
+}
+
+fn links(profile: &Profile) -> String {
+    if !profile.subscriber {
+        return "none, it does not subscribe".to_owned();
+    }
+    let DxbLimits { links, data, slots, .. } = profile.dxb;
+    format!("up to {links}, samples up to {data} octets; subscriber table: slots 1 to {slots} of {data} octets")
 }
 
 /// What is known of a device, each with its words.
@@ -114,8 +123,9 @@ fn facts(profile: &Profile) -> Vec<(&'static str, String)> {
         ("T_PLL_W", format!("up to {window}; less than {} counts as this", profile.min_window)),
         ("resolution", format!("{} steps in a revolution, {} revolutions", profile.steps_per_rev, profile.revolutions)),
         ("function", function(profile).to_owned()),
+        ("links", links(profile)),
         ("empty Data_Exchange", if profile.fail_safe { "means Clear (Fail_Safe)" } else { "is refused" }.to_owned()),
-        ("source", profile.source.to_owned()),
+        ("source", profile.source.to_string()),
     ]
 }
 

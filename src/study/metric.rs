@@ -162,6 +162,9 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
     /// Sends the rows of the cycle under way off and makes everything ready for the next.
     fn flush(&mut self) {
         let Some(mut row) = self.open.take() else { return };
+        if let Some(t_dp) = row.t_dp {
+            self.counts.network.cycle_times.add(t_dp);
+        }
         (row.latch_skew, row.skew_counts) = skew(&self.slaves);
         if let Some(counts) = row.skew_counts {
             let largest = &mut self.counts.network.skew_counts;
@@ -200,6 +203,13 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
     /// What the slave of number `index` observed.
     fn slave(&mut self, index: usize, stamp: &Stamp<'_>, what: &Observation) {
         self.counts.slaves[index].observe(stamp.at, self.counts.network.cycles, what);
+        if let Observation::Subscribed { publisher }
+        | Observation::WrongLength { publisher, .. }
+        | Observation::Link { publisher, .. } = *what
+            && let Some(link) = self.layout.link(publisher, stamp.station)
+        {
+            self.counts.links[link].observe(stamp.at, what);
+        }
         match *what {
             Observation::Latch { locked: true, .. } => self.latch(index, stamp.at),
             Observation::Subscribed { publisher } => self.subscribed(publisher, stamp),
@@ -256,7 +266,7 @@ impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
         if self.held.first().is_some_and(|event| event.at < stamp.at) {
             self.release();
         }
-        self.counts.station(what);
+        self.counts.station(stamp.station, what);
         if stamp.station == self.layout.master {
             self.master(&stamp, what);
         } else if let Some(index) = self.layout.slave(stamp.station) {

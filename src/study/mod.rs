@@ -1,12 +1,15 @@
 //! Studies: scenario files, runs, what they record, and what is made of it. The only layer that knows files,
 //! threads and reports.
 
+pub mod acyclic;
 pub mod build;
 pub mod count;
 pub mod devices;
 pub mod export;
+pub mod gsd;
 pub mod histogram;
 pub mod layout;
+pub mod live_list;
 pub mod metric;
 pub mod plan;
 pub mod plot;
@@ -18,3 +21,4 @@ pub mod run;
 mod sample;
 pub mod scenario;
 pub mod summary;
+pub mod topology;

@@ -1,263 +1,30 @@
-//! Planner: the arithmetic of the bus cycle, without simulating it.
+//! Planner: what a network will do, without simulating it.
 //!
 //! ```text
 //! t0                                          T_O                    T_I       t0 + T_DP
 //! |- T_ID2 -| request | reply |- T_ID1 -| ... | GAP | token | spare |           | SYNCH |
 //! |------------------- T_DX ------------------|
 //! ```
-//! Everything counts from t0, the last bit of SYNCH at the master (Model: D1), and takes the longest T_SDR that each
-//! device may need (Model: D2).
+//! Everything counts from t0, the last bit of SYNCH at the master (Model: D1). [`Plan::of`] takes the longest T_SDR that
+//! each device may need, [`Plan::expected`] the one that it has (Model: D2).
+//!
+//! | file | what |
+//! |---|---|
+//! | cycle | the arithmetic of the cycle, a dead time, a free-running network |
+//! | finding | what a rule finds: both sides, the margin, the nearest value that would do |
+//! | rules | the registry of all rules between times; reading a scenario uses the same |
+//! | proposal | a set of values that keeps all rules, with the shortest T_DP |
+//! | octets | Set_Prm and Chk_Cfg of every slave, octet by octet |
+//! | page, data | the plan as a page for people and as JSON |
+//! | command | `isodp plan` |
 
-use crate::device::profile::Profile;
-use crate::fdl::params::BusParams;
-use crate::study::scenario::{Bus, Scenario, Slave};
-use crate::time::{Span, Tbit};
-use crate::wire::Address;
+pub mod command;
+mod cycle;
+mod data;
+pub mod finding;
+pub mod octets;
+mod page;
+pub mod proposal;
+pub mod rules;
 
-/// SYNCH, a Global_Control of 13 octets.
-pub const SYNCH: Tbit = Tbit::of_octets(13);
-/// The token, 3 octets.
-pub const TOKEN: Tbit = Tbit::of_octets(3);
-/// Request of the FDL status, 6 octets.
-const STATUS_REQUEST: Tbit = Tbit::of_octets(6);
-/// Octets that a Data_Exchange telegram has around its data unit.
-const OVERHEAD: usize = 9;
-/// Octets that a telegram with SAPs has around its data unit.
-const SAP_OVERHEAD: usize = 11;
-
-/// One Data_Exchange in the cycle, seen at the master's plug, relative to t0.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Slot {
-    /// With whom.
-    pub slave: Address,
-    /// First bit of the request.
-    pub request: Span,
-    /// Last bit of the request.
-    pub request_end: Span,
-    /// First bit of the reply at the latest.
-    pub reply: Span,
-    /// Last bit of the reply at the latest.
-    pub reply_end: Span,
-}
-
-/// A planned bus cycle.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Plan {
-    /// The Data_Exchange of every configured slave in address order (Model: D6).
-    pub slots: Vec<Slot>,
-    /// T_DX: from t0 to the last bit of the last reply (Model: D2).
-    pub t_dx: Span,
-    /// One GAP poll that nobody answers: T_ID1, the request and T_SL.
-    pub gap: Span,
-    /// One token: T_ID1 and its own length.
-    pub token: Span,
-    /// SYNCH with the T_ID1 before it.
-    pub synch: Span,
-}
-
-impl Plan {
-    /// Plans the cycle of `scenario`, whether its T_DP can hold it or not.
-    pub fn of(scenario: &Scenario) -> Self {
-        let bus = &scenario.bus.params;
-        let t_id1 = bus.span(bus.t_id1());
-        let mut start = bus.span(bus.t_id2());
-        let mut slots = Vec::with_capacity(scenario.slaves.len());
-        for slave in scenario.configured() {
-            let t_td = Bus::propagation(slave.position_mm.abs_diff(scenario.master.position_mm));
-            let t_sdr = longest_tsdr(bus, slave, scenario.publishes(slave.address));
-            let slot = slot(bus, slave, start, t_td * 2 + bus.span(t_sdr));
-            start = slot.reply_end + t_id1;
-            slots.push(slot);
-        }
-        Self {
-            t_dx: slots.last().map_or(Span::ZERO, |slot| slot.reply_end),
-            slots,
-            gap: t_id1 + bus.span(STATUS_REQUEST + bus.t_sl),
-            token: t_id1 + bus.span(TOKEN),
-            synch: t_id1 + bus.span(SYNCH),
-        }
-    }
-    /// T_DX as Set_Prm says it and slaves check it: in whole units of 1/12 us, rounded up.
-    pub fn t_dx_told(&self) -> Span {
-        self.t_dx.ceil_to(Span::from_iso_units(1))
-    }
-    /// What every T_DP must hold: the Data_Exchange, one GAP poll, one token, SYNCH (manual 3.3.2).
-    pub fn content(&self) -> Span {
-        self.t_dx + self.gap + self.token + self.synch
-    }
-    /// What T_DP must hold while `slave` starts up and all others exchange data: its Set_Prm of `octets`, which is its
-    /// longest service, one token, SYNCH. Model: D6, the service must end before SYNCH.
-    pub fn start_up(&self, scenario: &Scenario, slave: &Slave, octets: usize) -> Span {
-        let bus = &scenario.bus.params;
-        let own = self.slots.iter().find(|slot| slot.slave == slave.address);
-        let own = own.map_or(Span::ZERO, |slot| slot.reply_end - slot.request);
-        let set_prm = bus.rate.octets(SAP_OVERHEAD + octets);
-        let answer = (bus.span(bus.max_tsdr) + bus.rate.octets(SAP_OVERHEAD)).max(bus.span(bus.t_sl));
-        self.t_dx - own + set_prm + answer + self.token + self.synch
-    }
-    /// The shortest T_DP on the grid of `device` that holds the cycle and that the device allows (manual 3.3.2).
-    pub fn t_dp_min(&self, device: &Profile) -> Span {
-        self.content().max(device.t_dp_min).ceil_to(device.dp_grid())
-    }
-    /// Smallest T_O of `device` (manual 3.3.6, Model: D3).
-    pub fn t_o_min(&self, device: &Profile) -> Span {
-        smallest_t_o(self.t_dx_told(), device.t_o_min, device.io_grid())
-    }
-    /// Largest T_O of `slave` with its T_I in a cycle of `t_dp` (manual 3.3.5, Model: D3). Less than
-    /// [`Self::t_o_min`] if there is none.
-    pub fn t_o_max(&self, slave: &Slave, t_dp: Span) -> Span {
-        floor_to(t_dp - slave.times.t_i - slave.device.gap_min(slave.functions), slave.device.io_grid())
-    }
-    /// Largest T_I of `slave` with its T_O in a cycle of `t_dp` (manual 3.3.5, Model: D3). Less than
-    /// [`Profile::t_i_min`] if there is none.
-    pub fn t_i_max(&self, slave: &Slave, t_dp: Span) -> Span {
-        floor_to(t_dp - slave.times.t_o - slave.device.gap_min(slave.functions), slave.device.io_grid())
-    }
-}
-
-/// Smallest T_O on `grid` that exceeds T_DX + T_O_MIN (manual 3.3.6: strictly).
-pub const fn smallest_t_o(t_dx: Span, t_o_min: Span, grid: Span) -> Span {
-    let bound = t_dx.ticks() + t_o_min.ticks();
-    Span::from_ticks((bound.div_euclid(grid.ticks()) + 1) * grid.ticks())
-}
-
-/// The longest T_SDR of `slave` (t_bit): MaxTsdr, or min_TSDR in force where that is more. A publisher's min_TSDR is
-/// T_ID1 (Model: D2, D27).
-pub fn longest_tsdr(bus: &BusParams, slave: &Slave, publishes: bool) -> Tbit {
-    let min_tsdr = if publishes { bus.t_id1() } else { bus.min_tsdr };
-    slave.device.max_tsdr(bus.rate).max(min_tsdr)
-}
-
-/// The multiple of `grid` not above `span`.
-fn floor_to(span: Span, grid: Span) -> Span {
-    grid * span.div_floor(grid)
-}
-
-/// The Data_Exchange with `slave` whose request begins at `start` and whose reply begins `delay` after its end.
-fn slot(bus: &BusParams, slave: &Slave, start: Span, delay: Span) -> Slot {
-    let length = |octets: u8| bus.rate.octets(OVERHEAD + usize::from(octets));
-    let request_end = start + length(slave.device.outputs);
-    let reply = request_end + delay;
-    Slot { slave: slave.address, request: start, request_end, reply, reply_end: reply + length(slave.device.inputs) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::device::profile::find;
-    use crate::study::scenario::tests::network;
-    use crate::study::scenario::{Link, Master};
-    use crate::time::BitRate;
-
-    const GRID: Span = Span::from_us(125);
-
-    /// T_DX (us) of n encoders by rate, longest T_SDR as in the profile and as in a fast ASIC's GSD.
-    #[test]
-    fn worked_values_of_t_dx() {
-        let table = [
-            (BitRate::M1_5, [449.0, 823.0, 1_197.0, 3_067.0], [366.0, 657.0, 947.0, 2_401.0]),
-            (BitRate::M3, [291.0, 515.0, 738.0, 1_855.0], [225.0, 381.0, 538.0, 1_321.0]),
-            (BitRate::M6, [212.0, 359.0, 506.0, 1_240.0], [154.0, 243.0, 331.0, 774.0]),
-            (BitRate::M12, [164.5, 268.7, 372.8, 894.0], [114.5, 168.7, 222.8, 494.0]),
-        ];
-        for (rate, profile, fast) in table {
-            for (device, row) in [("posital-ocd-dpb1b", profile), ("simodrive-sensor-isochron", fast)] {
-                for (n, us) in [1, 2, 3, 8].into_iter().zip(row) {
-                    let t_dx = Plan::of(&network(rate, find(device).unwrap(), n)).t_dx.as_us();
-                    assert!((t_dx - us).abs() < 0.51, "{n} x {device} at {rate}: {t_dx} us, expected {us}");
-                }
-            }
-        }
-    }
-
-    /// Three fast encoders at 12 Mbit/s need 2674 units of 1/12 us.
-    #[test]
-    fn t_dx_is_exact() {
-        let network = network(BitRate::M12, find("simodrive-sensor-isochron").unwrap(), 3);
-        assert_eq!(Plan::of(&network).t_dx, Span::from_iso_units(2_674));
-    }
-
-    /// Manual 6.4.2, dialog "Clocking": one encoder at 1.5 Mbit/s gets a smallest T_O of 0.625 ms and T_I of 0.125 ms.
-    #[test]
-    fn clocking_dialog_of_the_manual() {
-        let device = find("scancon-sag-dpb1b").unwrap();
-        let plan = Plan::of(&network(BitRate::M1_5, device, 1));
-        assert_eq!(plan.t_dx, BitRate::M1_5.span(Tbit(674)));
-        assert_eq!(plan.t_o_min(device), Span::from_us(625));
-        assert_eq!(device.t_i_min(false), Span::from_us(125));
-    }
-
-    /// SINAMICS S120 manual: T_DX 300 us and T_O_MIN 125 us make T_O 500 us, with > as with >=.
-    #[test]
-    fn reference_times_of_a_drive() {
-        let (t_dx, t_o_min) = (Span::from_us(300), Span::from_us(125));
-        assert_eq!(smallest_t_o(t_dx, t_o_min, GRID), Span::from_us(500));
-        assert_eq!((t_dx + t_o_min).ceil_to(GRID), Span::from_us(500));
-    }
-
-    #[test]
-    fn t_o_exceeds_its_bound_strictly() {
-        assert_eq!(smallest_t_o(Span::from_us(250), GRID, GRID), Span::from_us(500));
-        assert_eq!(smallest_t_o(Span::from_us(250) - Span::from_ticks(1), GRID, GRID), Span::from_us(375));
-    }
-
-    /// A T_DX within the last 1/12 us before a point of the grid counts as that point, as the slave will see it.
-    #[test]
-    fn t_o_exceeds_the_t_dx_that_slaves_are_told() {
-        let device = find("posital-ocd-dpb1b").unwrap();
-        let mut plan = Plan::of(&network(BitRate::M12, device, 1));
-        plan.t_dx = Span::from_us(1_500) - Span::from_ticks(1);
-        assert_eq!((plan.t_dx_told(), plan.t_o_min(device)), (Span::from_us(1_500), Span::from_us(1_750)));
-        plan.t_dx = Span::from_us(1_500) - Span::from_iso_units(1);
-        assert_eq!((plan.t_dx_told(), plan.t_o_min(device)), (plan.t_dx, Span::from_us(1_625)));
-    }
-
-    #[test]
-    fn slots_follow_each_other_after_t_id1() {
-        let mut network = network(BitRate::M12, find("posital-ocd-dpb1b").unwrap(), 2);
-        // 100 m are 500 ns, 6 t_bit, there and back 12.
-        network.slaves[1].position_mm = 100_000;
-        let plan = Plan::of(&network);
-        let tbit = |span: Span| span.div_floor(BitRate::M12.bit());
-        let slots: Vec<_> =
-            plan.slots.iter().map(|s| [s.request, s.request_end, s.reply, s.reply_end].map(tbit)).collect();
-        assert_eq!(slots, [[800, 943, 1_743, 1_974], [2_050, 2_193, 3_005, 3_236]]);
-        assert_eq!(tbit(plan.content()), 3_236 + (76 + 66 + 1_000) + (76 + 33) + (76 + 143));
-    }
-
-    #[test]
-    fn a_silent_station_takes_no_time() {
-        let mut network = network(BitRate::M12, find("posital-ocd-dpb1b").unwrap(), 3);
-        let all = Plan::of(&network);
-        network.slaves[1].silent = true;
-        let plan = Plan::of(&network);
-        assert_eq!(plan.slots.iter().map(|slot| slot.slave.get()).collect::<Vec<_>>(), [3, 5]);
-        assert_eq!(all.slots[..2].iter().map(|slot| slot.reply_end).max(), Some(plan.t_dx));
-    }
-
-    #[test]
-    fn a_publisher_waits_at_least_t_id1() {
-        let mut network = network(BitRate::M1_5, find("simodrive-sensor-isochron").unwrap(), 1);
-        let alone = Plan::of(&network).t_dx;
-        let publisher = network.slaves[0].address;
-        network.links.push(Link { publisher, subscriber: Address::new(9).unwrap(), offset: 4, length: 4 });
-        assert_eq!(Plan::of(&network).t_dx - alone, BitRate::M1_5.span(Tbit(37 - 25)));
-    }
-
-    #[test]
-    fn ranges_of_t_o_and_t_i_meet_the_gap_rule() {
-        let device = find("posital-ocd-dpb1b").unwrap();
-        let mut network = network(BitRate::M12, device, 1);
-        let plan = Plan::of(&network);
-        let Master { t_dp, .. } = network.master;
-        let slave = &mut network.slaves[0];
-        for functions in [false, true] {
-            slave.functions = functions;
-            slave.times.t_i = device.t_i_min(functions);
-            slave.times.t_o = plan.t_o_max(slave, t_dp);
-            assert_eq!(t_dp - slave.times.t_i - slave.times.t_o, device.gap_min(functions));
-            assert_eq!(plan.t_i_max(slave, t_dp), slave.times.t_i);
-        }
-        assert_eq!(plan.t_dp_min(device), Span::from_us(500));
-    }
-}
+pub use cycle::*;

@@ -1,6 +1,8 @@
 //! Report: the summary of a run as text that fits a screen.
 
-use super::summary::{Distribution, LedSummary, LinkSummary, SlaveSummary, Summary};
+use super::acyclic::AcyclicSummary;
+use super::live_list::Seen;
+use super::summary::{Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, StationSummary, Summary};
 use crate::observation::Leds;
 use crate::time::Span;
 
@@ -8,15 +10,20 @@ use crate::time::Span;
 pub const SLAVES: usize = 16;
 /// Links that are shown; of more, the slowest.
 pub const LINKS: usize = 8;
+/// Stations of the live list that are shown, of those that are remarkable; of more, the worst.
+pub const STATIONS: usize = 4;
 
 /// The summary as text; `dir` is where its files are, none if there are none.
 pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     let mut lines = Vec::new();
     network(summary, &mut lines);
+    topology(summary, &mut lines);
     slaves(summary, &mut lines);
     leds(summary, &mut lines);
+    live_list(summary, &mut lines);
     spread(summary, &mut lines);
     links(summary, &mut lines);
+    acyclic(summary, &mut lines);
     fingerprint(summary, &mut lines);
     files(summary, dir, &mut lines);
     lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
@@ -48,12 +55,38 @@ fn network(summary: &Summary, lines: &mut Vec<String>) {
         (counts.faults, "fault"),
         (counts.retries, "retry"),
         (counts.no_answers, "missing answer"),
+        (counts.diagnoses, "DH reply"),
+        (counts.auto_clears, "AutoClear"),
         (counts.late_clocks, "late clock"),
         (counts.collisions, "collision"),
         (counts.disturbed, "disturbed telegram"),
     ];
     let text: Vec<_> = happened.iter().filter(|(count, _)| *count > 0).map(|&(n, what)| number(n, what)).collect();
     lines.push(if text.is_empty() { "nothing went wrong on the bus".to_owned() } else { text.join(", ") });
+    ring(summary, lines);
+}
+
+/// Token rotation and what it did to SYNCH, where the master was not alone.
+fn ring(summary: &Summary, lines: &mut Vec<String>) {
+    let Some(ring) = &summary.ring else { return };
+    let late = if ring.late_clocks > 0 {
+        format!("{} late by up to {}", ring.late_clocks, ring.latest)
+    } else {
+        "never late".to_owned()
+    };
+    lines.push(format!(
+        "token rotation {} in the mean, {} to {}   SYNCH {late}, {} missed",
+        ring.mean, ring.min, ring.max, ring.missed_clocks
+    ));
+}
+
+/// What is doubtful about the cables, and how they are joined if there is more than one.
+fn topology(summary: &Summary, lines: &mut Vec<String>) {
+    lines.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}")));
+    if !summary.topology.is_empty() {
+        lines.push(String::new());
+        lines.extend(summary.topology.iter().cloned());
+    }
 }
 
 fn slaves(summary: &Summary, lines: &mut Vec<String>) {
@@ -113,13 +146,74 @@ fn leds(summary: &Summary, lines: &mut Vec<String>) {
 }
 
 /// Ascending numbers as `3..5, 9`.
-fn ranges(numbers: &[u8]) -> String {
+pub(super) fn ranges(numbers: &[u8]) -> String {
     let part = |run: &[u8]| match *run {
         [first, _, .., last] => format!("{first}..{last}"),
         [first, last] => format!("{first}, {last}"),
         _ => run.iter().map(u8::to_string).collect(),
     };
     numbers.chunk_by(|a, b| a + 1 == *b).map(part).collect::<Vec<_>>().join(", ")
+}
+
+/// The counters of a bus analyser: all together, and those of the stations where there is something to look at.
+fn live_list(summary: &Summary, lines: &mut Vec<String>) {
+    let total = |count: fn(&StationSummary) -> u64| summary.live_list.iter().map(count).sum::<u64>();
+    let timing = &summary.timing;
+    let mut shown: Vec<_> = summary.live_list.iter().filter(|station| station.is_remarkable()).collect();
+    let more = shown.len().saturating_sub(STATIONS);
+    lines.push(String::new());
+    lines.push(format!(
+        "live list: {}, lost {}, syncs {}, repeats {}, illegal {}, diagnoses {}   cycle time {}, mean {}",
+        number(summary.live_list.len(), "station"),
+        total(|station| station.lost),
+        total(|station| station.syncs),
+        total(|station| station.repeats),
+        total(|station| station.illegal_responses),
+        total(|station| station.diagnoses),
+        range(timing.cycle_min, timing.cycle_max),
+        span(timing.cycle_mean),
+    ));
+    if shown.is_empty() {
+        return;
+    }
+    if more > 0 {
+        shown.sort_by_key(|station| std::cmp::Reverse(rank(station)));
+        shown.truncate(STATIONS);
+        shown.sort_by_key(|station| station.address);
+    }
+    let rows: Vec<_> = shown.iter().map(|station| station_cells(station)).collect();
+    lines.extend(aligned(STATION_HEADER, &[1], &rows));
+    if more > 0 {
+        lines.push(format!("the {STATIONS} worst stations; {more} more are remarkable, see live-list.txt"));
+    }
+}
+
+/// The whole live list, a line per station.
+pub(super) fn live_list_of_all(summary: &Summary) -> String {
+    let rows: Vec<_> = summary.live_list.iter().map(station_cells).collect();
+    aligned(STATION_HEADER, &[1], &rows).iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
+}
+
+/// What makes a station worse than another: not being there, then losses, then its worst state, then its answers.
+fn rank(station: &StationSummary) -> (bool, u64, Seen, u64) {
+    (station.seen == Seen::Missing, station.lost, station.seen, station.illegal_responses + station.repeats)
+}
+
+/// Titles over [`station_cells`].
+const STATION_HEADER: &[&str] =
+    &["station", "worst state", "lost", "syncs", "repeats", "most in a cycle", "illegal", "diagnoses"];
+
+fn station_cells(station: &StationSummary) -> Vec<String> {
+    let counts = [
+        station.lost,
+        station.syncs,
+        station.repeats,
+        station.repeats_max_per_cycle,
+        station.illegal_responses,
+        station.diagnoses,
+    ];
+    let names = [station.address.to_string(), station.seen.text().to_owned()];
+    names.into_iter().chain(counts.iter().map(u64::to_string)).collect()
 }
 
 fn spread(summary: &Summary, lines: &mut Vec<String>) {
@@ -148,7 +242,19 @@ fn links(summary: &Summary, lines: &mut Vec<String>) {
         shown.truncate(LINKS);
         shown.sort_by_key(|link| (link.publisher, link.subscriber));
     }
-    let header = ["publish latency", "p50", "p90", "p99", "p99.9", "max", "age at use max"];
+    let header = [
+        "publish latency",
+        "p50",
+        "p90",
+        "p99",
+        "p99.9",
+        "max",
+        "age at use max",
+        "valid",
+        "lost",
+        "wrong length",
+        "longest gap",
+    ];
     let rows: Vec<_> = shown.iter().map(|link| link_cells(link)).collect();
     lines.push(String::new());
     lines.extend(aligned(&header, &[], &rows));
@@ -159,6 +265,8 @@ fn links(summary: &Summary, lines: &mut Vec<String>) {
 
 fn link_cells(link: &LinkSummary) -> Vec<String> {
     let publish = |value: fn(&Distribution) -> Option<Span>| span(link.distribution("publish").and_then(value));
+    let count =
+        |of: fn(&Receptions) -> u64| link.receptions.as_ref().map_or_else(|| "-".to_owned(), |all| of(all).to_string());
     vec![
         format!("{} -> {}", link.publisher, link.subscriber),
         publish(|latency| latency.p50),
@@ -167,7 +275,19 @@ fn link_cells(link: &LinkSummary) -> Vec<String> {
         publish(|latency| latency.p99_9),
         publish(|latency| latency.max),
         span(link.distribution("age").and_then(|age| age.max)),
+        count(|receptions| receptions.valid),
+        count(|receptions| receptions.lost),
+        count(|receptions| receptions.length_errors),
+        span(link.receptions.and_then(|receptions| receptions.longest_gap)),
     ]
+}
+
+/// Acyclic services, a line per class of master.
+fn acyclic(summary: &Summary, lines: &mut Vec<String>) {
+    if !summary.acyclic.is_empty() {
+        lines.push(String::new());
+        lines.extend(summary.acyclic.iter().map(AcyclicSummary::line));
+    }
 }
 
 fn fingerprint(summary: &Summary, lines: &mut Vec<String>) {
@@ -210,10 +330,11 @@ fn at(word: &str, limit: Option<Span>) -> String {
     limit.map_or_else(|| "-".to_owned(), |limit| format!("{word} {limit}"))
 }
 fn range(low: Option<Span>, high: Option<Span>) -> String {
-    if low == high { span(low) } else { format!("{} to {}", span(low), span(high)) }
+    let (low, high) = (span(low), span(high));
+    if low == high { low } else { format!("{low} to {high}") }
 }
 /// `1 slave`, `2 slaves`, `3 retries`.
-fn number(count: impl TryInto<u64>, noun: &str) -> String {
+pub(super) fn number(count: impl TryInto<u64>, noun: &str) -> String {
     let count = count.try_into().unwrap_or(u64::MAX);
     match noun.strip_suffix('y') {
         _ if count == 1 => format!("1 {noun}"),
@@ -233,6 +354,9 @@ mod tests {
         let (slave, link) = (summary.slaves[1].clone(), summary.links[0].clone());
         summary.slaves =
             (3..3 + slaves).map(|address| SlaveSummary { address, faults: Vec::new(), ..slave.clone() }).collect();
+        let station = summary.live_list[2];
+        let remarkable = |address| StationSummary { address, lost: u64::from(address) % 10, ..station };
+        summary.live_list = (3..3 + slaves).map(remarkable).collect();
         summary.links = (3..3 + slaves).map(|publisher| LinkSummary { publisher, ..link.clone() }).collect();
         for (number, slave) in summary.slaves.iter_mut().step_by(10).enumerate() {
             slave.faults = vec![("0F04".to_owned(), number as u64)];
@@ -253,10 +377,15 @@ slave  device   state      phase                 lock  PLL error p99     max  la
     5  encoder  DATA_EXCH  5 operation      20 cycles          42 ns  -42 ns              45 ns  45 ns  1 x 0F04
 LEDs red dark, green dark at slave 3: no supply
 
+live list: 3 stations, lost 1, syncs 2, repeats 2, illegal 0, diagnoses 2   cycle time 1 ms to 1.001 ms, mean 1.001 ms
+station  worst state  lost  syncs  repeats  most in a cycle  illegal  diagnoses
+      3  missing         0      0        0                0        0          0
+      5  lost            1      2        2                2        0          2
+
 latch skew: p50 90 ns, p90 90 ns, p99 90 ns, p99.9 90 ns, max 90 ns, 0.250 steps
 
-publish latency     p50     p90     p99   p99.9     max  age at use max
-         3 -> 5  400 us  400 us  400 us  400 us  400 us          750 us
+publish latency     p50     p90     p99   p99.9     max  age at use max  valid  lost  wrong length  longest gap
+         3 -> 5  400 us  400 us  400 us  400 us  400 us          750 us      0     0             0            -
 
 fingerprint: wire 0123456789abcdef
 2 files in out/sample
@@ -283,6 +412,34 @@ fingerprint: wire 0123456789abcdef
                 .unwrap_or_else(|| panic!("no {slave} in\n{text}"));
             assert!(line.ends_with(&format!("{} x 0F04", number + 1)), "{line}");
         }
+    }
+
+    #[test]
+    fn of_many_remarkable_stations_the_worst_are_shown() {
+        let mut summary = summary(100);
+        summary.live_list[50].seen = Seen::Missing;
+        let text = render(&summary, None);
+        let rows = text.lines().skip_while(|line| !line.starts_with("station")).skip(1).take(STATIONS);
+        let shown: Vec<&str> = rows.filter_map(|row| row.split_whitespace().next()).collect();
+        assert_eq!(shown, ["9", "19", "29", "53"], "{text}");
+        assert!(text.contains("the 4 worst stations; 96 more are remarkable, see live-list.txt\n"), "{text}");
+    }
+
+    #[test]
+    fn a_network_without_trouble_needs_one_line() {
+        let mut summary = sample::run();
+        let good = StationSummary { seen: Seen::Exchanging, lost: 0, syncs: 1, repeats: 0, ..summary.live_list[2] };
+        summary.live_list = vec![StationSummary { seen: Seen::Master, syncs: 0, ..good }, good];
+        let text = render(&summary, None);
+        assert!(text.contains("\nlive list: 2 stations, lost 0, syncs 1, repeats 0,"), "{text}");
+        assert!(!text.contains("worst state"), "{text}");
+    }
+
+    #[test]
+    fn warnings_are_told_where_the_bus_is() {
+        let mut summary = sample::run();
+        summary.warnings = vec!["too slow".to_owned()];
+        assert!(render(&summary, None).contains("\n1 fault, 2 retries\nwarning: too slow\n\nslave"));
     }
 
     #[test]

@@ -9,10 +9,12 @@ use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
+use super::plan::rules;
 use super::plot::{BusCycle, Distribution, Distributions, LinkLatencies, PlotError, PlotMeta, Plots};
 use super::row::Sink;
 use super::scenario::{Extent, Scenario};
 use super::summary::{Facts, SlaveFacts, Summary};
+use super::topology::Map;
 use crate::device::node::Node;
 use crate::sim::fingerprint::{Digest, Fingerprint, Fingerprints};
 use crate::sim::motion::Shaft;
@@ -23,6 +25,8 @@ use crate::wire::Address;
 
 /// Events between two looks at the progress.
 const STRIDE: u64 = 50_000;
+/// File of the topology in text.
+const TOPOLOGY: &str = "topology.txt";
 /// Bins of a histogram in a picture.
 const BINS: usize = 120;
 
@@ -149,16 +153,16 @@ pub fn run<Q: Queue<NetworkEvent>>(
     let (counts, sinks) = metrics.finish(network.now());
 
     let summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
-    conclude(summary, &counts, sinks, bus.as_ref(), &fingerprints, dir)
+    conclude(scenario, summary, &counts, sinks, (&fingerprints, bus.as_ref()), dir)
 }
 
-/// Adds the fingerprints and the LEDs, then writes the files.
+/// Adds the fingerprints, the LEDs, what slaves and masters did and the topology, then writes the files.
 fn conclude(
+    scenario: &Scenario,
     mut summary: Summary,
     counts: &Counts,
     sinks: Sinks,
-    bus: Option<&BusCycle>,
-    fingerprints: &Fingerprints,
+    (fingerprints, bus): (&Fingerprints, Option<&BusCycle>),
     dir: Option<PathBuf>,
 ) -> Result<Outcome, RunError> {
     let mut digest = Digest::default();
@@ -173,11 +177,22 @@ fn conclude(
     ];
     summary.fingerprint = texts.map(|(name, hash)| (name.to_owned(), format!("{hash:016x}"))).to_vec();
     summary.show_leds(counts);
+    summary.show_receptions(counts);
+    summary.show_acyclic(counts);
+    let map = Map::of(scenario);
+    if scenario.topology.has_segments() {
+        summary.topology = map.text(false);
+    }
+    summary.warnings = [scenario.warnings(), rules::warnings(scenario)].concat();
 
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {
         pictures = stage(dir, plots.pictures(&distributions(&sinks.histograms), bus)?)?;
         summary.files.extend(Plots::files().map(str::to_owned));
+    }
+    if let Some(dir) = &dir {
+        pictures.extend(stage(dir, vec![(TOPOLOGY, map.text(true).join("\n") + "\n")])?);
+        summary.files.push(TOPOLOGY.to_owned());
     }
     if let Some(exports) = sinks.exports {
         exports.finish(pictures, &sinks.histograms, &mut summary)?;
@@ -185,7 +200,7 @@ fn conclude(
     Ok(Outcome { summary, fingerprint, stations: fingerprints.stations().collect(), statistics, dir })
 }
 
-/// Writes the pictures under temporary names.
+/// Writes pictures and texts under temporary names.
 fn stage(dir: &Path, pictures: Vec<(&str, String)>) -> Result<Vec<Staged>, ExportError> {
     let mut staged = Vec::with_capacity(pictures.len());
     for (name, text) in pictures {
@@ -206,7 +221,7 @@ fn cycles(scenario: &Scenario) -> u64 {
 
 /// The slaves that take part and their links.
 pub fn layout(scenario: &Scenario) -> Layout {
-    let slaves = scenario.slaves.iter().filter(|slave| !slave.silent);
+    let slaves = scenario.configured();
     let slaves = slaves
         .map(|slave| SlaveLayout { address: slave.address, t_i: slave.times.t_i, encoder: !slave.device.subscriber })
         .collect();
@@ -222,17 +237,18 @@ fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
         slaves: layout.slaves().iter().map(|slave| slave.address).collect(),
         links: layout.links().to_vec(),
         duration: scenario.master.t_dp * cycles(scenario) as i64,
+        topology: Map::of(scenario),
     }
 }
 
 fn facts(scenario: &Scenario) -> Facts {
-    let slaves = scenario.slaves.iter().filter(|slave| !slave.silent);
+    let slaves = scenario.configured();
     Facts {
         scenario: scenario.name.clone(),
         bit_rate: scenario.bus.params.rate,
         seed: scenario.run.seed,
         slaves: slaves
-            .map(|slave| SlaveFacts { device: slave.device.name.to_owned(), t_o: Some(slave.times.t_o) })
+            .map(|slave| SlaveFacts { device: slave.device.name.clone().into_owned(), t_o: Some(slave.times.t_o) })
             .collect(),
         fingerprint: Vec::new(),
     }

@@ -6,7 +6,7 @@ use super::histogram::Histograms;
 use super::layout::{Layout, SlaveLayout};
 use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
 use super::summary::{Facts, SlaveFacts, Summary};
-use crate::observation::{Leds, Observation, Phase, PllState, SlaveState};
+use crate::observation::{HandlerState, Leds, Observation, Phase, PllState, SlaveState};
 use crate::time::{BitRate, Span, Time};
 use crate::wire::Address;
 
@@ -94,6 +94,23 @@ pub(super) fn summary() -> Summary {
     Summary::new(facts(), &counts, &Histograms::new(&layout()))
 }
 
+/// What the master observed in a run: it finds slave 5, loses it and finds it again; two requests are repeated.
+fn seen() -> [Observation; 8] {
+    let slave = address(5);
+    let (from, to) = (HandlerState::AwaitReady, HandlerState::DataExchange);
+    let joined = Observation::Handler { slave, from, to };
+    [
+        Observation::TokenClaimed,
+        Observation::DiagnosisRead { slave },
+        joined,
+        Observation::Retry { slave },
+        Observation::Retry { slave },
+        Observation::Lost { slave },
+        Observation::DiagnosisRead { slave },
+        joined,
+    ]
+}
+
 /// A run of three cycles in which slave 5 did something.
 pub(super) fn run() -> Summary {
     let (layout, mut counts, facts) = (layout(), Counts::new(&layout()), facts());
@@ -111,9 +128,15 @@ pub(super) fn run() -> Summary {
     slave.leds = Leds::DataExchange;
     slave.lock = Some(Lock { cycles: 20, span: Span::from_ms(20) });
     slave.faults.insert(0x0F04, 1);
+    for what in seen() {
+        counts.live_list.observe(address(1), &what);
+    }
+    counts.network.cycle_times.add(Span::from_ms(1));
+    counts.network.cycle_times.add(Span::from_us(1_001));
     counts.finish(Time::ZERO + Span::from_s(10));
     let mut summary = Summary::new(facts, &counts, &histograms);
     summary.show_leds(&counts);
+    summary.show_receptions(&counts);
     summary.thinning = vec![Thinning::new("cycles.csv", 1_000, 3, 1)];
     summary.files = vec!["cycles.csv".to_owned(), "summary.json".to_owned()];
     summary

@@ -5,33 +5,50 @@
 //! and the rules of the bus and of the devices are checked on the whole. What is wrong on the way is collected
 //! into one [`ScenarioError`].
 
+mod acyclic;
 mod check;
+mod class1;
+mod class2;
 pub mod error;
 #[cfg(test)]
 mod faults;
+mod gsd;
 pub mod kinds;
+mod link;
 mod options;
 mod read;
 mod section;
+mod services;
+mod station;
+pub mod topology;
 mod tree;
 
+use check::Check;
+pub use class2::{Class2, Class2Job};
 pub use error::{Fault, Position, Problem, ScenarioError};
+pub use link::{Link, Sample, Table};
+pub use station::Station;
 
 use crate::device::options::{Resolution, UnitOptions};
-use crate::device::profile::Profile;
-pub use crate::dp::handler::{Patch, StartupTelegram};
+use crate::device::profile::Device;
+use crate::dp::handler::{Patch, StartupTelegram};
+pub use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
 pub use crate::sim::fault::{Bursts, Disturbance, Service};
 use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
+use crate::wire::control::GlobalControl;
 pub use crate::wire::parameter::Format;
+pub use class1::Class1;
 use section::Reader;
-pub(super) use section::suggestion;
+pub(super) use section::{nearest, suggestion};
+pub use services::{MasterServices, SlaveServices};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+pub use topology::{Point, Topology};
 use tree::Source;
 
 /// A whole scenario, complete and checked.
@@ -43,12 +60,18 @@ pub struct Scenario {
     pub question: String,
     /// How long, and with which draws.
     pub run: Run,
-    /// The line.
+    /// The bus: its rate and its times.
     pub bus: Bus,
-    /// The only master.
+    /// Segments of cable and what joins them.
+    pub topology: Topology,
+    /// The master whose figures are taken.
     pub master: Master,
+    /// Further, free-running class 1 masters in the order of the file.
+    pub class1: Vec<Class1>,
     /// The slaves in address order, which is the order of Data_Exchange (Model: D6).
     pub slaves: Vec<Slave>,
+    /// Class 2 masters in the order of the file.
+    pub class2: Vec<Class2>,
     /// Slave-to-slave links in the order of the file.
     pub links: Vec<Link>,
     /// Orders in the order of the file; at one instant this is the order in which they act.
@@ -57,6 +80,22 @@ pub struct Scenario {
     pub disturbances: Vec<Disturbance>,
     /// What to keep.
     pub record: Record,
+}
+
+/// Where the text of a scenario comes from.
+struct Origin<'a> {
+    /// The directory in which GSD files are looked for.
+    dir: &'a Path,
+    /// The scenario's name.
+    name: &'a str,
+    /// What messages call it.
+    source: &'a str,
+}
+
+impl<'a> Origin<'a> {
+    fn of_text(name: &'a str, source: &'a str) -> Self {
+        Self { dir: Path::new(source).parent().unwrap_or(Path::new("")), name, source }
+    }
 }
 
 impl Scenario {
@@ -70,29 +109,63 @@ impl Scenario {
     /// # Errors
     /// The file cannot be read, is no text, too long or empty, or [`Self::parse`] finds something wrong.
     pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        Self::open(path, overrides, Check::All)
+    }
+    /// As [`Self::load`], but the rules of [`plan::rules`](crate::study::plan::rules) may be broken: a network to plan.
+    ///
+    /// # Errors
+    /// As [`Self::load`] for everything else.
+    pub fn load_to_plan(path: &Path, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        Self::open(path, overrides, Check::ToPlan)
+    }
+    fn open(path: &Path, overrides: &[(String, String)], check: Check) -> Result<Self, ScenarioError> {
         let source = path.display().to_string();
-        let octets = read_file(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
+        let octets = read_file(path, "scenario", "name one scenario file in it, *.toml")
+            .map_err(|fault| ScenarioError::about_file(&source, fault))?;
         let text = decode(&octets).map_err(|fault| ScenarioError::about_file(&source, fault))?;
         let name = name_of(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
-        Self::parse(&name, &source, text, overrides)
+        let dir = path.parent().unwrap_or(Path::new(""));
+        Self::read(&Origin { dir, name: &name, source: &source }, text, overrides, check)
     }
 
-    /// Reads `text` as the scenario `name`; messages call it `source`. `overrides` as for [`Self::load`].
+    /// Reads `text` as the scenario `name`; messages call it `source`, and GSD files are looked for beside it.
+    /// `overrides` as for [`Self::load`].
     ///
     /// # Errors
     /// The text is no TOML, a key is unknown, missing or wrong, or a rule of the bus or of a device is broken.
     pub fn parse(name: &str, source: &str, text: &str, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
+        Self::read(&Origin::of_text(name, source), text, overrides, Check::All)
+    }
+    /// As [`Self::parse`], but the rules of [`plan::rules`](crate::study::plan::rules) may be broken: a network to plan.
+    ///
+    /// # Errors
+    /// As [`Self::parse`] for everything else.
+    pub fn parse_to_plan(
+        name: &str,
+        source: &str,
+        text: &str,
+        overrides: &[(String, String)],
+    ) -> Result<Self, ScenarioError> {
+        Self::read(&Origin::of_text(name, source), text, overrides, Check::ToPlan)
+    }
+    fn read(
+        origin: &Origin<'_>,
+        text: &str,
+        overrides: &[(String, String)],
+        check: Check,
+    ) -> Result<Self, ScenarioError> {
+        let &Origin { dir, name, source } = origin;
         if text.trim().is_empty() {
             let fault = Fault::new("the scenario is empty").help("it needs [run], [bus], [master] and a [[slave]]");
             return Err(ScenarioError::about_file(source, fault));
         }
-        let source = Source::new(source, text, overrides);
+        let source = Source::new(source, text, overrides).in_dir(dir);
         let root = source.parse()?;
         let mut reader = Reader::new(&source);
         let read = read::scenario(&mut reader, root);
         let mut problems = reader.take_problems();
         if let Some(mut scenario) = read.filter(|_| problems.is_empty()) {
-            problems = check::check(&scenario, &mut reader);
+            problems = check::check(&scenario, &mut reader, check);
             if problems.is_empty() {
                 name.clone_into(&mut scenario.name);
                 scenario.question = question(text);
@@ -107,7 +180,7 @@ impl Scenario {
     }
     /// The slaves that the master has in its list, in address order: all but the silent ones.
     pub fn configured(&self) -> impl Iterator<Item = &Slave> {
-        self.slaves.iter().filter(|slave| !slave.silent)
+        self.slaves_of(self.master.address)
     }
     /// Whether the slave at `address` is parameterised as publisher.
     pub fn publishes(&self, address: Address) -> bool {
@@ -115,8 +188,8 @@ impl Scenario {
     }
 }
 
-/// The octets of the file `path`.
-fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
+/// The octets of the file `path`, which is a `noun`; `in_directory` says what to name instead of a directory.
+pub(super) fn read_file(path: &Path, noun: &str, in_directory: &str) -> Result<Vec<u8>, Fault> {
     let unreadable = |error: std::io::Error| {
         Fault::new(match error.kind() {
             std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
@@ -126,10 +199,10 @@ fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
     };
     let metadata = std::fs::metadata(path).map_err(unreadable)?;
     if metadata.is_dir() {
-        return Err(Fault::new("this is a directory").help("name one scenario file in it, *.toml"));
+        return Err(Fault::new("this is a directory").help(in_directory));
     }
     let too_long = |megabytes: u64| {
-        Fault::new(format!("a {megabytes} MB file is no scenario")).rule("a scenario has at most 4 MB")
+        Fault::new(format!("a {megabytes} MB file is no {noun}")).rule(format!("a {noun} has at most 4 MB"))
     };
     if metadata.len() > Scenario::MAX_FILE {
         return Err(too_long(metadata.len().div_ceil(1_000_000)));
@@ -196,23 +269,18 @@ pub enum Extent {
     Cycles(u64),
 }
 
-/// The line.
+/// The bus.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Bus {
     /// Bit rate and the times of the data link layer.
     pub params: BusParams,
-    /// Length of the cable (mm), at most [`Bus::MAX_CABLE_MM`].
+    /// Length of the cable of a network without segments (mm), at most [`Bus::MAX_CABLE_MM`].
     pub cable_mm: u64,
 }
 
 impl Bus {
     /// The longest cable (mm), 100 km. Model: no network of copper and glass comes near it.
     pub const MAX_CABLE_MM: u64 = 100_000_000;
-
-    /// T_TD, how long a signal takes for `mm` of cable: 5 ns/m (PROFIBUS network manual), rounded up to a tick.
-    pub const fn propagation(mm: u64) -> Span {
-        Span::from_ticks((mm * 60).div_ceil(1_000) as i64)
-    }
 }
 
 /// The master with its application.
@@ -220,11 +288,17 @@ impl Bus {
 pub struct Master {
     /// Its address, 0..=125.
     pub address: Address,
-    /// Where on the cable it sits (mm).
+    /// Index of its segment.
+    pub segment: u8,
+    /// Where on the segment's cable it sits (mm).
     pub position_mm: u64,
     /// How far its crystal is off.
     pub crystal: Crystal,
-    /// Bus cycle T_DP (manual 3.3.2).
+    /// Whether its cycles begin with SYNCH.
+    pub pace: Pace,
+    /// When its supply comes on.
+    pub powered_at: Span,
+    /// Bus cycle T_DP (manual 3.3.2); without SYNCH the planned cycle.
     pub t_dp: Span,
     /// Master application cycle T_MAPC (T_DP), 1..=14 (manual 3.3.3).
     pub t_mapc: u8,
@@ -248,6 +322,10 @@ pub struct Master {
     pub life_delay: u32,
     /// Whether further tokens to itself fill the spare time (Model: D6).
     pub active_spare: bool,
+    /// C1_Response_Timeout, after which an acyclic request over MS1 is given up; a multiple of 10 ms (GSD).
+    pub ms1_timeout: Span,
+    /// How it watches and tells its slaves.
+    pub services: MasterServices,
 }
 
 /// How far a crystal is off its nominal frequency (10^-9), positive is fast.
@@ -295,9 +373,13 @@ impl Watchdog {
 pub struct Slave {
     /// Its address, 0..=125.
     pub address: Address,
+    /// The master that has it in its list.
+    pub master: Address,
     /// What it is.
-    pub device: &'static Profile,
-    /// Where on the cable it sits (mm).
+    pub device: Device,
+    /// Index of its segment.
+    pub segment: u8,
+    /// Where on the segment's cable it sits (mm).
     pub position_mm: u64,
     /// How far its crystal is off.
     pub crystal: Crystal,
@@ -319,8 +401,13 @@ pub struct Slave {
     pub silent: bool,
     /// When its supply comes on (true time).
     pub powered_at: Span,
+    /// What it is parameterised for besides Data_Exchange.
+    pub services: SlaveServices,
     /// Where it differs from the model's defaults (Model: D11, D12, D14 to D16, D18, D21).
     pub options: UnitOptions,
+    /// User parameters of a device from a GSD file, with what the scenario sets: Set_Prm from octet 8 on, before what
+    /// the configuration tool adds. Empty for the other devices.
+    pub user_prm: Vec<u8>,
 }
 
 impl Slave {
@@ -361,25 +448,13 @@ pub struct Scaling {
     pub total_range: u32,
 }
 
-/// One slave-to-slave link (manual 3.4).
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Link {
-    /// Whose inputs.
-    pub publisher: Address,
-    /// Who takes them.
-    pub subscriber: Address,
-    /// Where the sample begins in the publisher's inputs (octets).
-    pub offset: u8,
-    /// Length of the sample (octets).
-    pub length: u8,
-}
-
 /// An order at an instant.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Event {
     /// When.
     pub when: When,
-    /// Which slaves it is about, in address order; empty for an order to the master alone.
+    /// Which slaves it is about, in address order; empty for an order to the master alone. The supply of masters can
+    /// be switched too.
     pub slaves: Vec<Address>,
     /// What to do.
     pub action: Action,
@@ -451,6 +526,8 @@ pub enum Action {
     Clear,
     /// The master changes to Operate.
     Operate,
+    /// The master sends Sync, Freeze or their ends to these groups.
+    Control(GlobalControl),
 }
 
 /// What a run keeps.
@@ -498,12 +575,15 @@ pub(crate) mod tests {
     use crate::time::BitRate;
 
     /// `n` slaves of the kind `device` from address 3 on at a bus without length, T_DP 8 ms.
-    pub(crate) fn network(rate: BitRate, device: &'static Profile, n: u8) -> Scenario {
+    pub(crate) fn network(rate: BitRate, device: impl Into<Device>, n: u8) -> Scenario {
+        let device = device.into();
         let address = |number| Address::new(number).unwrap();
         let (t_i, t_o, t_pll_w) = (Span::from_us(125), Span::from_ms(4), Span::from_us(1));
         let slave = |number| Slave {
             address: address(number),
-            device,
+            master: address(2),
+            device: device.clone(),
+            segment: 0,
             position_mm: 0,
             crystal: Crystal::Offset(0),
             t_sdr: Tbit(30),
@@ -515,17 +595,23 @@ pub(crate) mod tests {
             scaling: None,
             silent: false,
             powered_at: Span::ZERO,
+            services: SlaveServices::default(),
             options: UnitOptions::default(),
+            user_prm: Vec::new(),
         };
         Scenario {
             name: "network".into(),
             question: String::new(),
             run: Run { seed: 1, duration: Extent::Cycles(1_000) },
             bus: Bus { params: BusParams::profile(rate), cable_mm: 0 },
+            topology: Topology::line(0),
             master: Master {
                 address: address(2),
+                segment: 0,
                 position_mm: 0,
                 crystal: Crystal::Offset(0),
+                pace: Pace::Synch,
+                powered_at: Span::ZERO,
                 t_dp: Span::from_ms(8),
                 t_mapc: 1,
                 watchdog: Watchdog::of(Span::from_ms(200)),
@@ -538,8 +624,12 @@ pub(crate) mod tests {
                 life_start: 1,
                 life_delay: 0,
                 active_spare: false,
+                ms1_timeout: Span::from_s(10),
+                services: MasterServices::default(),
             },
+            class1: Vec::new(),
             slaves: (3..3 + n).map(slave).collect(),
+            class2: Vec::new(),
             links: Vec::new(),
             events: Vec::new(),
             disturbances: Vec::new(),

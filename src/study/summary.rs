@@ -2,10 +2,12 @@
 
 use serde::{Serialize, Serializer};
 
-use super::count::{Counts, SlaveCounts};
+use super::acyclic::AcyclicSummary;
+use super::count::{Counts, LinkCounts, SlaveCounts};
 use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
+use super::live_list::{Seen, Station};
 use crate::observation::Leds;
 use crate::time::{BitRate, Span};
 use crate::wire::Address;
@@ -15,10 +17,19 @@ use crate::wire::Address;
 pub struct Summary {
     /// The network and the run.
     pub network: Network,
+    /// Segments, links and stations as a drawing in text; empty for a network of one cable.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub topology: Vec<String>,
+    /// What a network like this should not have, but may.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// The bus cycle.
     pub timing: Timing,
     /// What happened how often.
     pub counts: Happened,
+    /// The token ring; none where the master was alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ring: Option<Ring>,
     /// Distributions of the network's quantities, by name.
     #[serde(serialize_with = "map")]
     pub distributions: Vec<(&'static str, Distribution)>,
@@ -26,6 +37,11 @@ pub struct Summary {
     pub slaves: Vec<SlaveSummary>,
     /// Per link, by publisher, then subscriber.
     pub links: Vec<LinkSummary>,
+    /// Every station that was seen or looked for, in address order.
+    pub live_list: Vec<StationSummary>,
+    /// Acyclic services per class of master; none before [`Summary::show_acyclic`].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub acyclic: Vec<AcyclicSummary>,
     /// Name and text of each fingerprint.
     #[serde(serialize_with = "map")]
     pub fingerprint: Vec<(String, String)>,
@@ -110,6 +126,15 @@ pub struct Timing {
     /// Largest T_O.
     #[serde(rename = "t_o_max_us", serialize_with = "us_or_null")]
     pub t_o_max: Option<Span>,
+    /// Shortest true time between two cycle starts at the master.
+    #[serde(rename = "cycle_time_min_us", serialize_with = "us_or_null")]
+    pub cycle_min: Option<Span>,
+    /// Mean of the same.
+    #[serde(rename = "cycle_time_mean_us", serialize_with = "us_or_null")]
+    pub cycle_mean: Option<Span>,
+    /// Longest of the same.
+    #[serde(rename = "cycle_time_max_us", serialize_with = "us_or_null")]
+    pub cycle_max: Option<Span>,
 }
 
 /// What happened how often in the network.
@@ -121,6 +146,12 @@ pub struct Happened {
     pub retries: u64,
     /// Requests without answer after all retries.
     pub no_answers: u64,
+    /// Times that slaves asked for Slave_Diag during data exchange; not written where it did not happen.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub diagnoses: u64,
+    /// Times that the master went back to Clear on its own; not written where it did not happen.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub auto_clears: u64,
     /// SYNCHs that could not be sent when planned.
     pub late_clocks: u64,
     /// Tokens claimed after silence, the first one included.
@@ -133,6 +164,45 @@ pub struct Happened {
     pub events: u64,
     /// Largest latch skew \[steps\].
     pub skew_max_steps: Option<f64>,
+}
+
+/// The token ring as the master saw it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct Ring {
+    /// How often the token came round.
+    pub rotations: u64,
+    /// Shortest token rotation time T_RR.
+    #[serde(rename = "rotation_min_us", serialize_with = "us")]
+    pub min: Span,
+    /// Mean token rotation time.
+    #[serde(rename = "rotation_mean_us", serialize_with = "us")]
+    pub mean: Span,
+    /// Longest token rotation time.
+    #[serde(rename = "rotation_max_us", serialize_with = "us")]
+    pub max: Span,
+    /// SYNCHs that could not be sent when planned.
+    pub late_clocks: u64,
+    /// The latest of them.
+    #[serde(rename = "late_clock_max_us", serialize_with = "us")]
+    pub latest: Span,
+    /// SYNCHs that were left out because the token was away for a whole cycle.
+    pub missed_clocks: u64,
+}
+
+impl Ring {
+    fn of(counts: &Counts) -> Option<Self> {
+        let network = &counts.network;
+        let rotation = &network.rotation;
+        Some(Self {
+            rotations: rotation.count,
+            min: rotation.min,
+            mean: rotation.mean()?,
+            max: rotation.max,
+            late_clocks: network.late_clocks,
+            latest: network.latest_clock,
+            missed_clocks: network.missed_clocks,
+        })
+    }
 }
 
 /// What became of one slave.
@@ -175,12 +245,58 @@ pub struct SlaveSummary {
     pub retries: u64,
     /// Requests without answer after all retries.
     pub no_answers: u64,
+    /// Times that it asked for Slave_Diag during data exchange; not written where it did not happen.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub diagnoses: u64,
     /// True time in each start-up phase.
     #[serde(rename = "phases_ms", serialize_with = "phases")]
     pub phases: Vec<(&'static str, Span)>,
     /// Distributions of the slave's quantities, by name.
     #[serde(serialize_with = "map")]
     pub distributions: Vec<(&'static str, Distribution)>,
+}
+
+/// One line of the live list; what each figure counts is told by [`Station`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct StationSummary {
+    /// Its address.
+    pub address: u8,
+    /// What it was seen as at worst.
+    #[serde(rename = "worst_state", serialize_with = "seen")]
+    pub seen: Seen,
+    /// How often it left data exchange against its master's will.
+    pub lost: u64,
+    /// How often it was brought into data exchange.
+    pub syncs: u64,
+    /// Repeated requests.
+    pub repeats: u64,
+    /// Most of them in one cycle.
+    pub repeats_max_per_cycle: u64,
+    /// Answers that do not fit their request.
+    pub illegal_responses: u64,
+    /// Diagnoses read.
+    pub diagnoses: u64,
+}
+
+impl StationSummary {
+    /// Whether there is something to look at: it is not where it should be, was started more than once, or did not answer
+    /// as it should.
+    pub const fn is_remarkable(&self) -> bool {
+        self.seen.is_bad() || self.lost > 0 || self.syncs > 1 || self.repeats > 0 || self.illegal_responses > 0
+    }
+    fn of((address, station): (u8, &Station)) -> Option<Self> {
+        let &Station { lost, syncs, repeats, most_repeats, illegal, diagnoses, .. } = station;
+        Some(Self {
+            address,
+            seen: station.seen?,
+            lost,
+            syncs,
+            repeats,
+            repeats_max_per_cycle: most_repeats,
+            illegal_responses: illegal,
+            diagnoses,
+        })
+    }
 }
 
 /// What the two LEDs of a slave show (manual 5.2).
@@ -208,9 +324,32 @@ pub struct LinkSummary {
     pub publisher: u8,
     /// Who takes them.
     pub subscriber: u8,
+    /// How often it worked and how often not; none before [`Summary::show_receptions`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub receptions: Option<Receptions>,
     /// Distributions of the link's quantities, by name.
     #[serde(serialize_with = "map")]
     pub distributions: Vec<(&'static str, Distribution)>,
+}
+
+/// What a subscriber got from one publisher.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct Receptions {
+    /// Valid receptions.
+    pub valid: u64,
+    /// How often nothing came for the watchdog time.
+    pub lost: u64,
+    /// Data of another length than parameterised.
+    pub length_errors: u64,
+    /// Longest true time between two valid receptions.
+    #[serde(rename = "longest_gap_ms", serialize_with = "ms_or_null")]
+    pub longest_gap: Option<Span>,
+}
+
+impl From<&LinkCounts> for Receptions {
+    fn from(&LinkCounts { valid, lost, length_errors, longest_gap, .. }: &LinkCounts) -> Self {
+        Self { valid, lost, length_errors, longest_gap }
+    }
 }
 
 /// A distribution in a few numbers. Percentiles have three significant digits, the rest is exact.
@@ -280,14 +419,18 @@ impl Summary {
         let link = |&(publisher, subscriber): &(Address, Address)| LinkSummary {
             publisher: publisher.get(),
             subscriber: subscriber.get(),
+            receptions: None,
             distributions: distributions(histograms, Subject::Link(publisher, subscriber)),
         };
         Self {
-            timing: timing(&facts, histograms),
+            timing: timing(&facts, counts, histograms),
             counts: happened(counts),
+            ring: Ring::of(counts),
             distributions: distributions(histograms, Subject::Network),
             slaves: (0..facts.slaves.len()).map(|index| slave(index, &facts, counts, histograms)).collect(),
             links: layout.links().iter().map(link).collect(),
+            live_list: counts.live_list.stations().filter_map(StationSummary::of).collect(),
+            acyclic: Vec::new(),
             network: Network {
                 scenario: facts.scenario,
                 bit_rate: facts.bit_rate.text(),
@@ -299,6 +442,8 @@ impl Summary {
                 duration: counts.network.duration,
             },
             fingerprint: facts.fingerprint,
+            topology: Vec::new(),
+            warnings: Vec::new(),
             thinning: Vec::new(),
             events_left_out: 0,
             files: Vec::new(),
@@ -311,6 +456,19 @@ impl Summary {
         for (slave, counts) in self.slaves.iter_mut().zip(&counts.slaves) {
             slave.leds = Some(LedSummary::of(counts.leds));
         }
+    }
+
+    /// Adds what the subscribers received. What becomes of links is in the fingerprint of the states, and the latencies of
+    /// every reception are in that of the statistics, which therefore stays that of the latencies alone.
+    pub fn show_receptions(&mut self, counts: &Counts) {
+        for (link, counts) in self.links.iter_mut().zip(&counts.links) {
+            link.receptions = Some(counts.into());
+        }
+    }
+    /// Adds the acyclic services. All of them are on the line, whose hash is another fingerprint; the hash of all figures
+    /// stays comparable with that of runs before they were counted.
+    pub fn show_acyclic(&mut self, counts: &Counts) {
+        self.acyclic = AcyclicSummary::all(&counts.acyclic);
     }
 
     /// A distribution of the network by the name of its quantity.
@@ -345,7 +503,9 @@ fn distributions(histograms: &Histograms, subject: Subject) -> Vec<(&'static str
     QUANTITIES.iter().filter_map(|quantity| of(quantity.name)).collect()
 }
 
-fn timing(facts: &Facts, histograms: &Histograms) -> Timing {
+fn timing(facts: &Facts, counts: &Counts, histograms: &Histograms) -> Timing {
+    let cycles = counts.network.cycle_times;
+    let some = |time| (cycles.count > 0).then_some(time);
     let layout = histograms.layout();
     let network = |name| histograms.get(name, Subject::Network);
     let t_dx_max = network("t_dx").and_then(Histogram::max);
@@ -360,6 +520,9 @@ fn timing(facts: &Facts, histograms: &Histograms) -> Timing {
         t_i_max: t_i().max(),
         t_o_min: t_o().min(),
         t_o_max: t_o().max(),
+        cycle_min: some(cycles.min),
+        cycle_mean: cycles.mean(),
+        cycle_max: some(cycles.max),
     }
 }
 
@@ -369,6 +532,8 @@ fn happened(counts: &Counts) -> Happened {
         faults: counts.slaves.iter().map(SlaveCounts::fault_count).sum(),
         retries: network.retries,
         no_answers: network.no_answers,
+        diagnoses: network.diagnoses,
+        auto_clears: network.auto_clears,
         late_clocks: network.late_clocks,
         tokens_claimed: network.tokens_claimed,
         collisions: network.collisions,
@@ -398,13 +563,22 @@ fn slave(index: usize, facts: &Facts, counts: &Counts, histograms: &Histograms) 
         acknowledgements: counts.acknowledgements,
         retries: counts.retries,
         no_answers: counts.no_answers,
+        diagnoses: counts.diagnoses,
         phases: phases.map(|(phase, span)| (phase.text(), span)).collect(),
         distributions: distributions(histograms, Subject::Slave(counts.address)),
     }
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+const fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
 fn map<S: Serializer, K: Serialize, V: Serialize>(entries: &[(K, V)], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(entries.iter().map(|(key, value)| (key, value)))
+}
+#[allow(clippy::trivially_copy_pass_by_ref)] // As serde asks for it.
+fn seen<S: Serializer>(seen: &Seen, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(seen.text())
 }
 fn phases<S: Serializer>(phases: &[(&'static str, Span)], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(phases.iter().map(|&(phase, span)| (phase, Decimal::ms(span))))

@@ -308,7 +308,7 @@ impl<'a> Ends<'a> {
 /// `Initiate` request: `57 0 0 0`, timeout, features, profile, ends; 20 octets with the shortest addresses.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct InitiateReq<'a> {
-    /// Octets 5..=6, `Send_Timeout`; its unit is not in the sources.
+    /// Octets 5..=6, `Send_Timeout` (10 ms).
     pub send_timeout: u16,
     /// Octets 7..=8, `Features_Supported`; `01 00` is read and write.
     pub features: [u8; 2],
@@ -381,6 +381,30 @@ impl<'a> InitiateRes<'a> {
     }
 }
 
+codes! {
+    /// Why an MS2 connection is aborted, bits 3..=0 of an abort's reason.
+    pub enum AbortCode: u8 {
+        /// A PDU that does not belong into this state.
+        Sequence = 0x01, "sequence error (SE)";
+        /// An invalid request.
+        Format = 0x02, "invalid request (FE)";
+        /// A supervision time ran out.
+        Timeout = 0x03, "time-out (TO)";
+        /// An invalid response.
+        Response = 0x04, "invalid response (RE)";
+        /// The user asked for an invalid service.
+        Service = 0x05, "invalid service of the user (IV)";
+        /// The Send_Timeout asked for is too short.
+        SendTimeout = 0x06, "Send_Timeout too short (STO)";
+        /// An address behind the slave that is not there.
+        Address = 0x07, "invalid additional address (IA)";
+        /// The data link layer has not confirmed yet.
+        Confirmation = 0x08, "confirmation outstanding (OC)";
+        /// No resource.
+        Resource = 0x0F, "no resource (RES)";
+    }
+}
+
 /// `Abort`: why an MS2 connection ends.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Abort {
@@ -392,6 +416,15 @@ pub struct Abort {
     pub detail: u8,
 }
 impl Abort {
+    /// Instance 1: the protocol of the connection itself, neither the data link layer nor the user.
+    pub const PROTOCOL: u8 = 1;
+    /// Instance 2: the user.
+    pub const USER: u8 = 2;
+
+    /// An abort by the protocol of the connection.
+    pub const fn new(code: AbortCode) -> Self {
+        Self { subnet: 0, reason: Self::PROTOCOL << INSTANCE_SHIFT | code.code(), detail: 0 }
+    }
     fn parse(pdu: &[u8]) -> Result<Self, AcyclicError> {
         let &[_, subnet, reason, detail] = exact(pdu)?;
         Ok(Self { subnet, reason, detail })

@@ -2,7 +2,7 @@
 //!
 //! [`Telegram`] is one telegram of the line with everything that a receiver checks already checked, [`Frame`] holds the
 //! octets of one. The other modules read and write what a data unit carries: [`prm`] and [`config`] during start-up,
-//! [`diag`] and [`control`] beside the cycle, [`drive`] in each cycle, [`acyclic`] and [`parameter`] in what is left of it.
+//! [`diag`], [`link_status`] and [`control`] beside the cycle, [`drive`] in each cycle, [`acyclic`] and [`parameter`] in what is left of it.
 //!
 //! # Guarantees
 //! - No octets make a parser panic: what a remote station sends is data.
@@ -132,6 +132,7 @@ pub mod control;
 pub mod diag;
 pub mod drive;
 pub mod header;
+pub mod link_status;
 pub mod parameter;
 pub mod prm;
 pub mod telegram;

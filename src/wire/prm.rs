@@ -591,12 +591,16 @@ impl<'a> DxbLinks<'a> {
         let (entries, _) = self.entries.as_chunks::<{ DxbLink::LEN }>();
         entries.iter().map(|&[publisher, length, offset, sample]| DxbLink { publisher, length, offset, sample })
     }
+    /// Octet number of the first octet of entry `at`.
+    pub const fn octet(&self, at: usize) -> usize {
+        self.octet + at * DxbLink::LEN
+    }
     /// Checks every link, see [`DxbLink::check`].
     ///
     /// # Errors
     /// The first rule broken.
     pub fn check(&self, buffer: u8) -> Result<(), PrmError> {
-        self.iter().enumerate().try_for_each(|(at, link)| link.check(self.octet + at * DxbLink::LEN, buffer))
+        self.iter().enumerate().try_for_each(|(at, link)| link.check(self.octet(at), buffer))
     }
 }
 
@@ -651,12 +655,16 @@ impl<'a> DxbSubscriptions<'a> {
             destination,
         })
     }
+    /// Octet number of the first octet of entry `at`.
+    pub const fn octet(&self, at: usize) -> usize {
+        self.octet + at * DxbSubscription::LEN
+    }
     /// Checks every subscription, see [`DxbLink::check`].
     ///
     /// # Errors
     /// The first rule broken.
     pub fn check(&self, buffer: u8) -> Result<(), PrmError> {
-        self.iter().enumerate().try_for_each(|(at, entry)| entry.check(self.octet + at * DxbSubscription::LEN, buffer))
+        self.iter().enumerate().try_for_each(|(at, entry)| entry.check(self.octet(at), buffer))
     }
 }
 

@@ -3,7 +3,7 @@
 use isodp::time::Span;
 use isodp::wire::Status;
 
-use crate::rig::{MASTER, MS1, PRM, Reply, Rig, SET_PRM, prm};
+use crate::rig::{MASTER, MS1, MS2, MS2_RM, PRM, Reply, Rig, SET_PRM, STRANGER, prm};
 
 /// Sends a PDU and polls for its answer.
 fn asked(rig: &mut Rig, pdu: &[u8]) -> Vec<u8> {
@@ -123,4 +123,73 @@ fn section_4_without_dpv1_enable_the_access_point_is_closed() {
     let mut rig = Rig::exchanging(&prm(&[(8, 0x40)]));
     assert_eq!(rig.srd(MS1, &[0x5E, 1, 47, 240]), Reply::Status(Status::Rs));
     assert!(matches!(rig.exchange(&[0; 4]), Reply::Data(..)));
+}
+
+const INITIATE: [u8; 20] = [0x57, 0, 0, 0, 0, 100, 1, 0, 0, 0, 0x3D, 0, 0, 2, 0, 2, 0, 0, 0, 0];
+
+/// A class 2 master opens connection `which`.
+fn connect(rig: &mut Rig, station: u8, which: usize) {
+    assert_eq!(rig.srd_from(station, MS2_RM, &INITIATE), Reply::Data(station, vec![0x56, which as u8, 0, 100]));
+    let answer = polled(rig, station, which);
+    assert_eq!(answer, hex("57 F0 01 00 00 00 3D 00 00 02 00 02 00 00 00 00"));
+}
+/// Polls connection `which` for its answer.
+fn polled(rig: &mut Rig, station: u8, which: usize) -> Vec<u8> {
+    for _ in 0..50 {
+        match rig.srd_from(station, MS2[which], &[]) {
+            Reply::Ack => {}
+            Reply::Data(to, answer) if to == station => return answer,
+            other => panic!("{other:?}"),
+        }
+    }
+    panic!("no answer within 5 ms");
+}
+fn asked_over(rig: &mut Rig, station: u8, which: usize, pdu: &[u8]) -> Vec<u8> {
+    assert_eq!(rig.srd_from(station, MS2[which], pdu), Reply::Ack, "{pdu:02X?}");
+    polled(rig, station, which)
+}
+
+#[test]
+fn section_4_a_class_2_master_reads_whatever_the_master_does() {
+    let mut rig = Rig::new();
+    connect(&mut rig, STRANGER, 0);
+    let write = hex("5F 01 2F 0A 01 01 00 01 10 01 03 96 00 00");
+    let answer = hex("5E 01 2F 08 01 01 00 01 06 01 00 06");
+    assert_eq!(asked_over(&mut rig, STRANGER, 0, &write), hex("5F 01 2F 0A"), "before anybody has parameterised it");
+    assert_eq!(rig.srd(SET_PRM, &PRM), Reply::Ack);
+    assert_eq!(rig.srd(crate::rig::CHK_CFG, &crate::rig::CFG), Reply::Ack);
+    assert_eq!(asked_over(&mut rig, STRANGER, 0, &[0x5E, 1, 47, 240]), answer, "its answer outlives the start-up");
+    rig.srd(SET_PRM, &PRM);
+    assert_eq!(asked_over(&mut rig, STRANGER, 0, &[0x5E, 1, 47, 240]), answer, "and the end of data exchange");
+    assert_eq!(rig.srd_from(STRANGER, MS1, &[0x5E, 1, 47, 240]), Reply::Status(Status::Rs), "MS1 is not for it");
+}
+
+#[test]
+fn section_4_each_connection_has_its_own_parameter_channel() {
+    let mut rig = Rig::exchanging(&PRM);
+    connect(&mut rig, STRANGER, 0);
+    connect(&mut rig, 7, 1);
+    assert_eq!(rig.srd_from(8, MS2_RM, &INITIATE), Reply::Status(Status::Rs), "no third connection");
+    let request = |reference: u8| [0x5F, 1, 47, 10, reference, 1, 0, 1, 0x10, 1, 3, 0x96, 0, 0];
+    assert_eq!(asked(&mut rig, &request(1)), hex("5F 01 2F 0A"));
+    assert_eq!(asked_over(&mut rig, STRANGER, 0, &request(2)), hex("5F 01 2F 0A"));
+    assert_eq!(asked_over(&mut rig, 7, 1, &[0x5E, 1, 47, 240]), hex("DE 80 B5 00"), "it has asked for nothing");
+    assert_eq!(asked_over(&mut rig, 7, 1, &request(3)), hex("5F 01 2F 0A"));
+    let read = [0x5E, 1, 47, 240];
+    let answers = [asked(&mut rig, &read), asked_over(&mut rig, STRANGER, 0, &read), asked_over(&mut rig, 7, 1, &read)];
+    assert_eq!(answers.map(|answer| answer[4]), [1, 2, 3]);
+}
+
+#[test]
+fn section_4_a_connection_without_requests_is_aborted() {
+    let mut rig = Rig::exchanging(&PRM);
+    connect(&mut rig, STRANGER, 0);
+    rig.advance(rig.now + Span::from_ms(1_999));
+    assert_eq!(asked_over(&mut rig, STRANGER, 0, &[0x48, 0]), [0x48, 0], "twice the send timeout is not over");
+    rig.advance(rig.now + Span::from_ms(2_000));
+    assert_eq!(rig.srd_from(STRANGER, MS2[0], &[0x48, 0]), Reply::Data(STRANGER, hex("58 00 13 00")), "time-out");
+    assert_eq!(rig.srd_from(STRANGER, MS2[0], &[]), Reply::Status(Status::Rs), "closed");
+    connect(&mut rig, STRANGER, 0);
+    rig.advance(rig.now + Span::from_ms(3_001));
+    assert_eq!(rig.srd_from(STRANGER, MS2[0], &[]), Reply::Status(Status::Rs), "closed without telling anybody");
 }

@@ -7,6 +7,7 @@ pub mod csv;
 pub mod decimal;
 pub mod hlog;
 pub mod json;
+pub mod live_list;
 pub mod staged;
 pub mod thinning;
 
@@ -59,7 +60,7 @@ pub struct Exporter {
 }
 
 /// Every exporter. They close in this order; the summary is the last one, because the others add to it.
-pub const EXPORTERS: &[Exporter] = &[csv::EXPORTER, hlog::EXPORTER, json::EXPORTER];
+pub const EXPORTERS: &[Exporter] = &[csv::EXPORTER, hlog::EXPORTER, live_list::EXPORTER, json::EXPORTER];
 
 /// The files of one run.
 pub struct Exports {

@@ -2,7 +2,6 @@
 
 use plotters::style::RGBColor;
 
-use super::Material;
 use super::chart::{Axis, Ruler, plain};
 use super::lanes::Lanes;
 use super::look::{
@@ -10,6 +9,7 @@ use super::look::{
     WHITE, WIDTH, Words, counted, empty_page, fit, legend, legend_height, page, spread, text_width,
 };
 use super::telegrams::{Bar, Cycle, Kind};
+use super::{Material, PlotMeta};
 use crate::time::Time;
 use crate::wire::Address;
 
@@ -48,12 +48,12 @@ struct Dimension {
 }
 
 /// The cycle with everything counted from t0.
-struct View<'a> {
-    cycle: &'a Cycle,
-    slaves: &'a [Address],
-    t0: Time,
+pub(super) struct View<'a> {
+    pub(super) cycle: &'a Cycle,
+    pub(super) slaves: &'a [Address],
+    pub(super) t0: Time,
     /// First bit of the next SYNCH and the next t0 [µs].
-    next: (f64, f64),
+    pub(super) next: (f64, f64),
 }
 
 impl View<'_> {
@@ -68,6 +68,11 @@ impl View<'_> {
     /// Last bit before the silence [µs].
     fn quiet(&self) -> f64 {
         self.cycle.bars.iter().map(|bar| self.us(bar.end)).fold(0.0, f64::max)
+    }
+    /// End of the axis: a planned cycle, or its T_O, can be longer than T_DP. What is far away stays at the edge.
+    fn end(&self) -> f64 {
+        let cycle = self.quiet().max(self.next.1);
+        self.t_o().map_or(cycle, |t_o| cycle.max(t_o.0.min(2.0 * cycle)))
     }
     /// Latest T_O, whether another slave's differs by more than 1 µs, and its slave.
     fn t_o(&self) -> Option<(f64, bool, Address)> {
@@ -128,26 +133,33 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let next = ((next.0 - t0).as_us(), (next.1 - t0).as_us());
     let view = View { cycle, slaves: &meta.slaves, t0, next };
     words.subtitle = subtitle(&view);
-    let keys = keys(&view);
+    draw_view(meta, &words, &view)
+}
+
+/// Draws one cycle.
+pub(super) fn draw_view(meta: &PlotMeta, words: &Words<'_>, view: &View<'_>) -> Result<String, String> {
+    let cycle = view.cycle;
+    let keys = keys(view);
     let slaves = meta.slaves.len();
     let above = DIMENSIONS as i32 * DIMENSION + NAMES;
     let lanes_height = Lanes::each(slaves) * slaves as i32;
     let height = legend_height(&keys, WIDTH - 40) + above + BUS + 12 + lanes_height + Ruler::HEIGHT + 10;
-    page(meta, &words, height, |canvas, mut area| {
+    page(meta, words, height, |canvas, mut area| {
         legend(canvas, &mut area, &keys);
         let top = area.top + above;
         let plot =
             Area { left: area.left + Lanes::NAMES, top, right: area.right - 24, bottom: top + BUS + 12 + lanes_height };
         let start = cycle.bars.iter().map(|bar| view.us(bar.start)).fold(0.0, f64::min);
-        let air = next.1 * 0.005;
-        let ruler = Ruler::draw(canvas, plot, Axis::linear("time from t0 [us]", start - air, next.1 + air));
-        bus_lane(canvas, &view, &ruler, Area { bottom: top + BUS, ..plot });
+        let end = view.end();
+        let air = end * 0.005;
+        let ruler = Ruler::draw(canvas, plot, Axis::linear("time from t0 [us]", start - air, end + air));
+        bus_lane(canvas, view, &ruler, Area { bottom: top + BUS, ..plot });
         let lanes = Lanes::new(slaves, top + BUS + 12, plot.left, plot.right);
         for (index, &slave) in meta.slaves.iter().enumerate() {
-            slave_lane(canvas, &view, &ruler, (&lanes, index), slave);
+            slave_lane(canvas, view, &ruler, (&lanes, index), slave);
         }
-        dimensions(canvas, &view, &ruler, area.top);
-        names(canvas, &view, &ruler, top);
+        dimensions(canvas, view, &ruler, area.top);
+        names(canvas, view, &ruler, top);
     })
 }
 
@@ -206,6 +218,8 @@ fn names(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, bottom: i32) {
     let mut all: Vec<(Kind, i32, String)> =
         asking.map(|bar| (bar.kind, centre(view.us(bar.start), view.us(bar.end)), name(bar))).collect();
     all.push((Kind::Synch, centre(view.next.0, view.next.1), "SYNCH".to_owned()));
+    // The next SYNCH of a plan can come before the end of its cycle.
+    all.sort_by_key(|entry| entry.1);
     let (slaves, rare): (Vec<_>, Vec<_>) = all.into_iter().partition(|entry| entry.0 == Kind::Request);
     let width = |name: &str| text_width(name, LETTERS) + 6;
     let wanted: Vec<(i32, i32)> = rare.iter().map(|entry| (entry.1, width(&entry.2))).collect();

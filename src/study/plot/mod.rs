@@ -5,6 +5,7 @@
 //! results. One picture is one file here and one line in the registry.
 
 use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
+use super::topology::Map;
 use crate::time::Span;
 use crate::wire::Address;
 
@@ -15,6 +16,7 @@ mod distribution;
 mod lanes;
 mod latch_skew;
 mod look;
+pub mod plan;
 mod pll_convergence;
 mod position;
 mod publish_latency;
@@ -23,6 +25,7 @@ mod telegrams;
 #[cfg(test)]
 mod tests;
 mod timeline;
+mod topology;
 
 pub use distribution::{Distribution, Distributions, LinkLatencies};
 pub use telegrams::BusCycle;
@@ -42,6 +45,7 @@ const PLOTS: &[Plot] = &[
     Plot { file: "publish_latency.svg", draw: publish_latency::draw },
     Plot { file: "bus_cycle.svg", draw: bus_cycle::draw },
     Plot { file: "position.svg", draw: position::draw },
+    Plot { file: "topology.svg", draw: topology::draw },
 ];
 
 /// What every picture says about the run.
@@ -59,6 +63,8 @@ pub struct PlotMeta {
     pub links: Vec<(Address, Address)>,
     /// Simulated duration.
     pub duration: Span,
+    /// The segments with their stations.
+    pub topology: Map,
 }
 
 impl PlotMeta {

@@ -64,13 +64,22 @@ impl Cycle {
             latch: [None; STATIONS],
         }
     }
+    /// A cycle that nobody has seen, from `t0` to the first and the last bit of the next SYNCH.
+    pub(super) fn planned(t0: Time, next: (Time, Time)) -> Self {
+        Self { t0: Some(t0), next: Some(next), ..Self::new() }
+    }
+    /// T_O of a slave and its latch by a locked clock.
+    pub(super) fn plan_slave(&mut self, slave: Address, t_o: Time, latch: Time) {
+        let station = usize::from(slave.get()).min(STATIONS - 1);
+        (self.t_o[station], self.latch[station]) = (Some(t_o), Some((latch, true)));
+    }
     fn clear(&mut self) {
         (self.number, self.t0, self.next, self.dropped) = (None, None, None, 0);
         self.bars.clear();
         self.t_o = [None; STATIONS];
         self.latch = [None; STATIONS];
     }
-    fn push(&mut self, bar: Bar) {
+    pub(super) fn push(&mut self, bar: Bar) {
         if self.bars.len() < CAPACITY {
             self.bars.push(bar);
         } else {

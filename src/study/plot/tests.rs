@@ -9,6 +9,7 @@ use super::*;
 use crate::observation::{Disturbance, Inputs, Leds, Observation, Phase, PllState, SlaveCause, SlaveState};
 use crate::sim::crystal::Crystal;
 use crate::sim::record::{Recorder, Stamp, Transmission};
+use crate::study::topology::{Segment, Station, Via};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::{Fcb, Frame, Header, Sap, Service, Status};
 
@@ -17,6 +18,41 @@ const RATE: BitRate = BitRate::M12;
 
 fn address(number: usize) -> Address {
     Address::new(number as u8).unwrap()
+}
+
+/// The master and 30 slaves on each segment of 100 m, one behind the other.
+fn segments(slaves: &[Address]) -> Map {
+    let slaves: Vec<&[Address]> = if slaves.is_empty() { vec![&[]] } else { slaves.chunks(30).collect() };
+    let segment = |(index, slaves): (usize, &&[Address])| {
+        let station = |(place, &address): (usize, &Address)| Station {
+            address,
+            device: ["posital-ocd-dpb1b", "simodrive-sensor-isochron", "subscriber-drive"][place % 3].to_owned(),
+            mm: (place as u64 + 1) * 100_000 / slaves.len() as u64,
+            delay: Span::from_ns(667 * index as i64 + 17 * (place as i64 + 1)),
+        };
+        let master = Station { address: address(MASTER.into()), device: "master".into(), mm: 0, delay: Span::ZERO };
+        let via = index.checked_sub(1).map(|from| Via {
+            from,
+            from_mm: if index == 2 { 45_000 } else { 100_000 },
+            to_mm: if index == 3 { 60_000 } else { 0 },
+            what: if index == 1 { "2 olm, 300 m fibre".to_owned() } else { "repeater".to_owned() },
+            delay: Span::from_ns(167),
+            jitter: Span::from_ns(20 * (index as i64 % 2)),
+        });
+        Segment {
+            name: format!("hall {index}"),
+            cable_mm: 100_000,
+            loads: slaves.len() + 2,
+            stations: (index == 0)
+                .then_some(master)
+                .into_iter()
+                .chain(slaves.iter().enumerate().map(station))
+                .collect(),
+            via,
+            depth: index,
+        }
+    };
+    Map { segments: slaves.iter().enumerate().map(segment).collect() }
 }
 
 /// An invented run.
@@ -34,6 +70,7 @@ struct World {
 impl World {
     fn new(slaves: usize, cycles: u64, t_dp: Span) -> Self {
         let slaves: Vec<Address> = (3..3 + slaves).map(address).collect();
+        let topology = segments(&slaves);
         let links: Vec<_> = slaves.iter().skip(1).map(|&subscriber| (slaves[0], subscriber)).collect();
         let meta = PlotMeta {
             scenario: format!("invented-{}", slaves.len()),
@@ -42,6 +79,7 @@ impl World {
             slaves,
             links,
             duration: t_dp * cycles as i64,
+            topology,
         };
         let mut world = Self {
             plots: Plots::new(meta),
@@ -318,27 +356,32 @@ fn shape_box(node: roxmltree::Node<'_, '_>) -> Option<Box4> {
     })
 }
 
+/// Everything of a picture is inside of it, and no two texts meet.
+pub(super) fn all_inside_and_apart(name: &str, text: &str) {
+    let document = roxmltree::Document::parse(text).unwrap();
+    let height = number(document.root_element(), "height");
+    let mut texts: Vec<(Box4, String)> = Vec::new();
+    for node in document.descendants().filter(roxmltree::Node::is_element) {
+        let Some(found) = shape_box(node) else { continue };
+        let inside = found.0 >= 0.0 && found.1 >= 0.0 && found.2 <= f64::from(WIDTH) && found.3 <= height;
+        assert!(inside, "{name}: {node:?} {:?} at {found:?} is outside", node.text());
+        if node.has_tag_name("text") {
+            texts.push((found, node.text().unwrap_or("").trim().to_owned()));
+        }
+    }
+    for (index, (a, first)) in texts.iter().enumerate() {
+        for (b, second) in &texts[index + 1..] {
+            let apart = a.2 <= b.0 || b.2 <= a.0 || a.3 <= b.1 || b.3 <= a.1;
+            assert!(apart, "{name}: '{first}' {a:?} meets '{second}' {b:?}");
+        }
+    }
+}
+
 #[test]
 fn everything_is_inside_and_no_two_texts_meet() {
     for (name, world) in worlds() {
         for (file, text) in world.pictures() {
-            let document = roxmltree::Document::parse(&text).unwrap();
-            let height = number(document.root_element(), "height");
-            let mut texts: Vec<(Box4, String)> = Vec::new();
-            for node in document.descendants().filter(roxmltree::Node::is_element) {
-                let Some(found) = shape_box(node) else { continue };
-                let inside = found.0 >= 0.0 && found.1 >= 0.0 && found.2 <= f64::from(WIDTH) && found.3 <= height;
-                assert!(inside, "{name} {file}: {node:?} {:?} at {found:?} is outside", node.text());
-                if node.has_tag_name("text") {
-                    texts.push((found, node.text().unwrap_or("").trim().to_owned()));
-                }
-            }
-            for (index, (a, first)) in texts.iter().enumerate() {
-                for (b, second) in &texts[index + 1..] {
-                    let apart = a.2 <= b.0 || b.2 <= a.0 || a.3 <= b.1 || b.3 <= a.1;
-                    assert!(apart, "{name} {file}: '{first}' {a:?} meets '{second}' {b:?}");
-                }
-            }
+            all_inside_and_apart(&format!("{name} {file}"), &text);
         }
     }
 }
@@ -350,7 +393,7 @@ fn words(text: &str) -> String {
 }
 
 /// File; words of the title, axes with units, legend.
-const WORDS: [(&str, &[&str]); 7] = [
+const WORDS: [(&str, &[&str]); 8] = [
     ("latch_skew.svg", &["Latch skew:", "latch skew [ns]", "cycles (logarithmic)", "p99.9 ", "cycles per column"]),
     ("pll_convergence.svg", &["PLL convergence:", "error and window [ns]", "cycles since", "± window", "locked at"]),
     ("t_dp_deviation.svg", &["T_DP deviation:", "T_DP deviation [ns]", "time [", "cycles (logarithmic)", "p99 "]),
@@ -361,6 +404,7 @@ const WORDS: [(&str, &[&str]); 7] = [
     ("publish_latency.svg", &["Publish latency:", "latency [us]", "Wire:", "Publish:", "Age at use:", "p99.9"]),
     ("bus_cycle.svg", &["Bus cycle:", "time from t0 [us]", "T_DP ", "T_O ", "T_I ", "T_DX ", "spare ", "SYNCH", "DXB"]),
     ("position.svg", &["Position:", "G1_XIST1 [steps]", "time ["]),
+    ("topology.svg", &["Topology:", "hall 0: 100 m, ", " of 32 loads", "[ns]", "master", "posital-ocd-dpb1b", "17 ns"]),
 ];
 
 #[test]
@@ -427,7 +471,8 @@ fn the_kept_bus_cycle_has_a_gap_poll_if_one_was_complete() {
 
 #[test]
 fn every_file_of_this_folder_is_registered_or_serves_the_others() {
-    const SERVING: [&str; 8] = ["mod", "buckets", "chart", "distribution", "lanes", "look", "telegrams", "tests"];
+    const SERVING: [&str; 9] =
+        ["mod", "plan", "buckets", "chart", "distribution", "lanes", "look", "telegrams", "tests"];
     let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/study/plot");
     let stem = |path: &Path| path.file_stem().unwrap().to_string_lossy().into_owned();
     let files: BTreeSet<String> = std::fs::read_dir(dir).unwrap().map(|entry| stem(&entry.unwrap().path())).collect();

@@ -48,15 +48,15 @@ pub struct Fault {
 
 impl Fault {
     /// A fault that `message` says.
-    pub(super) fn new(message: impl Into<String>) -> Self {
+    pub(in crate::study) fn new(message: impl Into<String>) -> Self {
         Self { message: message.into(), ..Self::default() }
     }
     /// The same with the rule that it breaks.
-    pub(super) fn rule(self, rule: impl Into<String>) -> Self {
+    pub(in crate::study) fn rule(self, rule: impl Into<String>) -> Self {
         Self { rule: rule.into(), ..self }
     }
     /// The same with what would be right.
-    pub(super) fn help(self, help: impl Into<String>) -> Self {
+    pub(in crate::study) fn help(self, help: impl Into<String>) -> Self {
         Self { help: help.into(), ..self }
     }
 }
@@ -80,6 +80,7 @@ impl fmt::Display for ScenarioError {
     }
 }
 impl std::error::Error for ScenarioError {}
+impl std::error::Error for Problem {}
 
 /// Longest line that is shown (characters).
 const SHOWN: usize = 160;

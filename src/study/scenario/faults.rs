@@ -276,11 +276,11 @@ fn bus_parameters_that_break_a_rule() {
             "12 Mbit/s",
             "500 kbit/s",
             r#"
-good.toml:9:8: bus.rate: 500 kbit/s is too slow for isochronous mode
-  9 | rate = "500 kbit/s"
-    |        ^^^^^^^^^^^^
-  rule: isochronous mode is offered from 1.5 Mbit/s on (SIMODRIVE 611 universal manual)
-  help: "1.5 Mbit/s", "3 Mbit/s", "6 Mbit/s" or "12 Mbit/s"
+good.toml:14:8: master.t_dp: T_DP = 4 ms cannot hold the cycle of 4 slaves
+  14 | t_dp = "4 ms"
+     |        ^^^^^^
+  rule: T_DP >= T_DX 4.216 ms + GAP 606 us + token 140 us + Global_Control 360 us = 5.322 ms (manual 3.3.2)
+  help: the shortest is t_dp = "5.375 ms"
 "#,
         ),
         (
@@ -290,6 +290,17 @@ good.toml:9:8: bus.rate: 500 kbit/s is too slow for isochronous mode
 good.toml:9:8: bus.rate: "10 Mbit/s" is not a bit rate of PROFIBUS DP; the nearest is "12 Mbit/s"
   9 | rate = "10 Mbit/s"
     |        ^^^^^^^^^^^
+"#,
+        ),
+        (
+            "12 Mbit/s",
+            "12 Mbit/s\"\nt_sl = \"1200 tbit\"\nt_set = \"120 tbit",
+            r#"
+good.toml:11:9: bus.t_set: T_ID1 = 284 tbit is more than publisher 3 can be told
+  11 | t_set = "120 tbit"
+     |         ^^^^^^^^^^
+  rule: a publisher's min_TSDR is T_ID1 = 35 + 2 T_SET + T_QUI, at most 255 (Set_Prm octet 4, Model: D27)
+  help: t_set = "105 tbit" or less, or no links
 "#,
         ),
         (
@@ -584,8 +595,8 @@ good.toml:34:10: link.1.length: a sample of 4 octets from octet 10 on is not in 
 good.toml:37:14: link.2.subscriber: slave 11 has this publisher already
   37 | subscriber = 11
      |              ^^
-  rule: one link per publisher and subscriber (Model: D26 counts latencies by this pair)
-  help: one link whose sample holds both
+  rule: one link per publisher, subscriber and table (Model: D26 counts latencies by the pair)
+  help: one link with both: samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]
 ",
         ),
     ]);
@@ -808,6 +819,74 @@ fn rules_without_a_place_of_their_own() {
     assert!(text.contains("event.1.cycle: the run is over before this event"), "{text}");
 }
 
+/// The good file with these lines behind its link.
+fn linked(lines: &str) -> Result<Scenario, ScenarioError> {
+    parse(&GOOD.replace("subscriber = 11", &format!("subscriber = 11\n{lines}")), &[])
+}
+
+#[test]
+fn samples_tables_and_places_of_links() {
+    let samples = "samples = [{ offset = 4, length = 4 }, { offset = 0, length = 2 }]";
+    let found = linked(samples).unwrap_or_else(|error| panic!("{error}")).links[0].clone();
+    let sample = |offset, length, to| Sample { offset, length, to };
+    assert_eq!((found.table, found.samples), (Table::Link, vec![sample(4, 4, 0), sample(0, 2, 0)]));
+    let lines = format!("table = \"subscriber\"\nslot = 2\npublisher_length = 9\n{samples}");
+    let found = linked(&lines).unwrap_or_else(|error| panic!("{error}")).links[0].clone();
+    assert_eq!((found.slot(), found.publisher_length), (Some(2), Some(9)));
+    assert_eq!(found.samples, [sample(4, 4, 0), sample(0, 2, 4)], "one behind the other");
+    let other = "table = \"subscriber\"\nto = 7\n[[link]]\npublisher = 3\nsubscriber = 11";
+    let found = linked(other).unwrap_or_else(|error| panic!("{error}")).links;
+    assert_eq!(
+        (found[0].slot(), found[0].samples[0].to, found[1].table),
+        (Some(1), 7, Table::Link),
+        "one in each table"
+    );
+}
+
+#[test]
+fn samples_tables_and_places_that_cannot_be() {
+    let subscriber = "table = \"subscriber\"";
+    let cases = [
+        ("samples = []", "link.1.samples: a link has a sample at least"),
+        ("samples = 4", "link.1.samples: this is a number"),
+        ("samples = [4]", "link.1.samples: a sample is a table"),
+        ("samples = [{ offset = 4 }]", "link.1.samples.1.length: this key is missing"),
+        ("samples = [{ offset = 4, length = 4, at = 1 }]", "link.1.samples.1.at: there is no such key"),
+        ("offset = 4\nsamples = [{ offset = 4, length = 4 }]", "link.1: a link has either samples or offset"),
+        (
+            "samples = [{ offset = 0, length = 4 }, { offset = 10, length = 4 }]",
+            "link.1.samples.2.length: a sample of 4",
+        ),
+        ("length = 0", "link.1.length: a sample of 0 octets"),
+        ("publisher_length = 7", "offset 4 + length 4 <= 7 octets of publisher_length"),
+        ("publisher_length = 0", "link.1.publisher_length: 0 is out of range"),
+        ("publisher_length = 245", "link.1.publisher_length: 245 is out of range"),
+        ("table = \"links\"", "link.1.table: there is no table \"links\""),
+        ("slot = 1", "link.1: the link table has no slot"),
+        ("to = 1", "link.1: the link table has no to"),
+        ("samples = [{ offset = 4, length = 4, to = 1 }]", "the link table has no to"),
+        ("table = \"subscriber\"\nslot = 3", "link.1.slot: slave 11 has no slot 3 for samples"),
+        ("table = \"subscriber\"\nslot = 0", "link.1.slot: 0 is out of range"),
+        ("table = \"subscriber\"\nto = 241", "link.1.to: 4 octets from octet 241 on are not in the slot's data area"),
+        (
+            "table = \"subscriber\"\nsamples = [{ offset = 4, length = 4 }, { offset = 4, length = 4, to = 3 }]",
+            "link.1.samples.2.to: octets 0 to 3 of slot 1 are taken already",
+        ),
+        (
+            "publisher_length = 11\n[[link]]\npublisher = 3\nsubscriber = 11\ntable = \"subscriber\"",
+            "link.2.publisher_length: slave 11 would know two lengths of its publisher's data",
+        ),
+    ];
+    for (lines, expected) in cases {
+        let said = linked(lines).map(|scenario| scenario.links).unwrap_err().to_string();
+        assert!(said.contains(expected), "{lines}\n{said}");
+    }
+    let second = format!("{subscriber}\n[[link]]\npublisher = 4\nsubscriber = 11\n{subscriber}");
+    let said = linked(&second).map(|scenario| scenario.links).unwrap_err().to_string();
+    assert!(said.contains("link.2.to: octets 0 to 3 of slot 1 are taken already"), "{said}");
+    assert!(said.contains("for example to = 4"), "{said}");
+}
+
 #[test]
 fn a_subscriber_has_at_most_29_links() {
     let link = |i| format!("[[link]]\npublisher = {}\nsubscriber = 100\n", i + 3);
@@ -835,7 +914,7 @@ fn a_good_file_becomes_a_scenario() {
     assert_eq!(scenario.slaves[0].crystal, Crystal::Within(50_000));
     assert_eq!(scenario.slaves[0].motion, Motion::Speed { start: Angle::ZERO, micro_rpm: 1_500_000_000 });
     let (publisher, subscriber) = (address(3), address(11));
-    assert_eq!(scenario.links, [Link { publisher, subscriber, offset: 4, length: 4 }]);
+    assert_eq!(scenario.links, [Link::of(publisher, subscriber, 4, 4)]);
     let action = Action::HoldLifeSign { cycles: Some(2) };
     assert_eq!(scenario.events, [Event { when: When::Time(Span::from_s(1)), slaves: vec![publisher], action }]);
     let bursts = Bursts { from_cycle: 1_000, count: 1, every: Some(100) };
@@ -898,25 +977,83 @@ fn every_kind_can_be_read() {
         assert_eq!(scenario.master.gc_jitter.kind(), kind);
     }
     for kind in kinds::ACTIONS {
-        let about = if ["clear", "operate"].contains(&kind.name) { "" } else { "slaves = \"all\"" };
+        let command = ["sync", "unsync", "freeze", "unfreeze"].contains(&kind.name);
+        let masters = command || ["clear", "operate"].contains(&kind.name);
+        let about = if masters { "" } else { "slaves = \"all\"" };
+        let takes = [("device", "simodrive-sensor-isochron"), ("sync", "true"), ("freeze", "true"), ("groups", "[2]")];
+        let takes = takes.map(|(key, value)| (format!("slave.3.{key}"), value));
+        let sets: Vec<_> = takes.iter().filter(|_| command).map(|(key, value)| (key.as_str(), *value)).collect();
         let value = match kind.name {
             "jump-life-sign" => "to = 9",
             "control-word" => "value = 0x2000",
             "read-parameter" => "parameter = 979\nelements = 6",
             "change-parameter" => "parameter = 918\nvalue = 7",
             "set-prm" => "octets = [[24, 0x05], [16, 255]]\nlength = 58",
+            "sync" | "unfreeze" => "groups = [1, 2]",
             _ => "",
         };
         let event = format!("at = \"1 s\"\ndo = \"{}\"\n{about}\n{value}\n\n[[disturbance]]", kind.name);
         let start = GOOD.find("at = \"1 s\"").unwrap();
         let end = GOOD.find("[[disturbance]]").unwrap();
         let text = [&GOOD[..start], &event, &GOOD[end + "[[disturbance]]".len()..]].concat();
-        let scenario = parse(&text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let scenario = parse(&text, &sets).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(scenario.events[0].slaves.is_empty(), about.is_empty(), "{}", kind.name);
     }
     for kind in kinds::DISTURBANCES {
         good(&[("disturbance.1.kind", kind.name)]);
     }
+}
+
+#[test]
+fn services_that_do_not_fit() {
+    check_sets(&[
+        (
+            "slave.3.sync",
+            "true",
+            r#"
+--set "slave.3.sync=true": slave.3.sync: posital-ocd-dpb1b knows no sync
+  rule: a slave refuses what it does not know with Not_Supported (EN 50170-2, Set_Prm octet 1)
+  help: leave out sync; simodrive-sensor-isochron knows it
+"#,
+        ),
+        (
+            "slave.3.min_slave_interval",
+            "4.1 ms",
+            r#"
+--set "slave.3.min_slave_interval=4.1 ms": slave.3.min_slave_interval: T_DP = 4 ms is too short for slave 3
+  rule: T_DP >= Min_Slave_Interval = 4.1 ms of every slave (GSD, Min_Slave_Intervall in 100 us)
+  help: the shortest is t_dp = "4.125 ms"
+"#,
+        ),
+        (
+            "master.data_control_time",
+            "20 ms",
+            r#"
+--set "master.data_control_time=20 ms": master.data_control_time: a Data_Control_Time of 20 ms is too short
+  rule: Data_Control_Time >= 6 x T_DP = 24 ms: the mode is told every third of it, and not in every cycle (Model: D5)
+  help: data_control_time = "24 ms" or more
+"#,
+        ),
+        (
+            "slave.3.groups",
+            "[1, 8]",
+            r#"
+--set "slave.3.groups=[1, 8]": slave.3.groups: the groups are a list of numbers from 1 to 7
+  rule: group 8 is the clock's (Global_Control octet 2, 00 80 is SYNCH)
+  help: groups = [1, 3]
+"#,
+        ),
+    ]);
+    let event = "at = \"1 s\"\ndo = \"hold-life-sign\"\nslave = 3\nfor = 2";
+    let freeze = "at = \"1 s\"\ndo = \"freeze\"\ngroups = [2]";
+    assert!(said(event, freeze).contains("no slave takes this command"));
+    let text = GOOD.replace(event, freeze);
+    let takes = |group| {
+        let sets =
+            [("slave.3.freeze", "true"), ("slave.3.groups", group), ("slave.3.device", "simodrive-sensor-isochron")];
+        parse(&text, &sets).is_ok()
+    };
+    assert!(takes("[2]") && takes("[1, 2, 7]") && !takes("[1]"));
 }
 
 #[test]
@@ -990,7 +1127,99 @@ fn disturbed() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
+/// Two segments, each kind of link in turn between them, and a slave on each.
+const SEGMENTS: &str = r#"
+[run]
+cycles = 9
+[bus]
+rate = "12 Mbit/s"
+[[segment]]
+name = "a"
+cable = "100 m"
+[[segment]]
+name = "b"
+cable = "50 m"
+delay_per_metre = "6 ns"
+[[repeater]]
+kind = "olm"
+from = "a"
+to = "b"
+fibre = "10 m"
+modules = 3
+delay = "5 tbit"
+jitter = "20 ns"
+[master]
+address = 2
+segment = "a"
+t_dp = "4 ms"
+t_i = "125 us"
+t_o = "2 ms"
+[[slave]]
+address = 3
+segment = "a"
+device = "posital-ocd-dpb1b"
+[[slave]]
+addresses = "4..5"
+segment = "b"
+device = "posital-ocd-dpb1b"
+"#;
+
+#[test]
+fn segments_and_repeaters_are_read_and_overridden() {
+    let scenario = parse(SEGMENTS, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let [a, b] = scenario.topology.segments() else { panic!("two segments") };
+    assert_eq!((a.name.as_str(), a.cable_mm, a.delay_per_metre), ("a", 100_000, Span::from_ns(5)));
+    assert_eq!((b.name.as_str(), b.cable_mm, b.delay_per_metre), ("b", 50_000, Span::from_ns(6)));
+    let [link] = scenario.topology.repeaters() else { panic!("one link") };
+    assert_eq!((link.name.as_str(), link.kind.name, link.modules, link.fibre_mm), ("a - b", "olm", 3, 10_000));
+    assert_eq!(link.ends, [Point { segment: 0, mm: 100_000 }, Point { segment: 1, mm: 0 }]);
+    // Three modules of 5 t_bit and 10 m of glass.
+    assert_eq!(link.crossing(), Span::from_ns(1_250 + 50));
+    assert_eq!(link.jitter, Span::from_ns(20));
+    let at = |slave: &Slave| (slave.address.get(), slave.segment, slave.position_mm);
+    assert_eq!(scenario.slaves.iter().map(at).collect::<Vec<_>>(), [(3, 0, 100_000), (4, 1, 25_000), (5, 1, 50_000)]);
+
+    let sets = [
+        ("segment.2.cable", "60 m"),
+        ("repeater.1.delay", "1 us"),
+        ("slave.5.segment", "a"),
+        ("repeater.1.to_position", "7 m"),
+    ];
+    let other = parse(SEGMENTS, &sets).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(other.slaves.iter().map(at).collect::<Vec<_>>(), [(3, 0, 50_000), (4, 1, 60_000), (5, 0, 100_000)]);
+    assert_eq!(other.topology.repeaters()[0].crossing(), Span::from_ns(3_050));
+    assert_eq!(other.delay(address(2), address(4)), Span::from_ns(500 + 3_050 + 53 * 6));
+}
+
+#[test]
+fn t_td_is_the_delay_with_the_worst_jitter_and_rounded_up() {
+    let scenario = parse(SEGMENTS, &[("slave.5.position", "33333 mm"), ("repeater.1.to_position", "1 mm")]);
+    let scenario = scenario.unwrap_or_else(|error| panic!("{error}"));
+    let (master, slave) = (address(2), address(5));
+    assert_eq!(scenario.t_td(master, slave), scenario.t_td(slave, master));
+    let more = scenario.t_td(master, slave) - scenario.delay(master, slave) - Span::from_ns(20);
+    assert!((Span::ZERO..=Span::from_ticks(2)).contains(&more), "{more}");
+    assert!(scenario.topology.t_td_max() >= scenario.t_td(master, slave));
+    assert_eq!(scenario.t_td(master, address(77)), Span::ZERO, "there is no such station");
+}
+
 proptest! {
+    #[test]
+    fn numbers_of_any_size_in_segments_do_not_panic(
+        place in prop::sample::select(vec![
+            "segment.1.cable", "segment.2.delay_per_metre", "segment.2.name", "repeater.1.from", "repeater.1.to",
+            "repeater.1.from_position", "repeater.1.to_position", "repeater.1.delay", "repeater.1.jitter",
+            "repeater.1.modules", "repeater.1.fibre", "repeater.1.kind", "master.segment", "slave.4.segment",
+            "slave.4.position", "bus.cable",
+        ]),
+        number in prop_oneof![any::<i64>(), -1000i64..100_000],
+        unit in prop::sample::select(vec!["", " tick", " us", " s", " tbit", " m", " km", " mm"]),
+    ) {
+        match parse(SEGMENTS, &[(place, &format!("{number}{unit}"))]) {
+            Err(error) => prop_assert!(!error.problems.is_empty()),
+            Ok(scenario) => prop_assert!(scenario.topology.t_td_max() >= Span::ZERO),
+        }
+    }
     #[test]
     fn no_octets_panic(octets in prop_oneof![prop::collection::vec(any::<u8>(), 0..400), disturbed()]) {
         if let Ok(text) = decode(&octets)
@@ -1001,7 +1230,7 @@ proptest! {
     }
     #[test]
     fn no_override_panics(
-        key in "(master|slave|run|bus|link|event|x)(\\.(3|1|0|t_o|rate|cable|motion|)){0,3}",
+        key in "(master|slave|run|bus|link|event|segment|repeater|x)(\\.(3|1|0|t_o|rate|cable|motion|)){0,3}",
         value in ".{0,30}",
     ) {
         if let Err(error) = parse(GOOD, &[(&key, &value)]) {

@@ -2,6 +2,7 @@
 
 use super::error::Fault;
 use super::section::{Reader, Section, choice, instant, number, quantity};
+use super::services::command;
 use super::tree::{Node, Value};
 use super::{Action, Bursts, Disturbance, Format, Patch, Service, StartupTelegram};
 use crate::sim::motion::{Angle, Motion, Shaft};
@@ -9,6 +10,7 @@ use crate::sim::noise::{GcJitter, KINDS as JITTERS};
 use crate::study::quantity::{angle, micro_rpm};
 use crate::time::{Span, Time};
 use crate::wire::Address;
+use crate::wire::control::GlobalControl;
 
 /// A word of scenario files and what stands behind it.
 #[derive(Clone, Copy, Debug)]
@@ -98,6 +100,26 @@ pub const ACTIONS: &[Kind<Action>] = &[
     Kind { name: "power-on", what: "the slaves get their supply back", read: |_, _| Some(Action::PowerOn) },
     Kind { name: "clear", what: "the master changes to Clear", read: |_, _| Some(Action::Clear) },
     Kind { name: "operate", what: "the master changes to Operate", read: |_, _| Some(Action::Operate) },
+    Kind {
+        name: "sync",
+        what: "the master sends Sync to `groups`: outputs that wait take effect, further ones wait",
+        read: |section, reader| command(GlobalControl { sync: true, ..GlobalControl::OPERATE }, section, reader),
+    },
+    Kind {
+        name: "unsync",
+        what: "the master sends Unsync to `groups`: outputs take effect as they come",
+        read: |section, reader| command(GlobalControl { unsync: true, ..GlobalControl::OPERATE }, section, reader),
+    },
+    Kind {
+        name: "freeze",
+        what: "the master sends Freeze to `groups`: the inputs of this instant are held",
+        read: |section, reader| command(GlobalControl { freeze: true, ..GlobalControl::OPERATE }, section, reader),
+    },
+    Kind {
+        name: "unfreeze",
+        what: "the master sends Unfreeze to `groups`: inputs are fresh again",
+        read: |section, reader| command(GlobalControl { unfreeze: true, ..GlobalControl::OPERATE }, section, reader),
+    },
 ];
 
 /// What can go wrong on the line.
@@ -251,7 +273,7 @@ pub(super) fn address(node: &Node) -> Result<Address, Fault> {
 }
 
 /// The largest stray of `jitter`, if it has a bound.
-pub(super) const fn jitter_bound(jitter: GcJitter) -> Option<Span> {
+pub(in crate::study) const fn jitter_bound(jitter: GcJitter) -> Option<Span> {
     match jitter {
         GcJitter::None => Some(Span::ZERO),
         GcJitter::Uniform { half_width } => Some(half_width),

@@ -40,6 +40,7 @@ pub(super) fn read(section: &mut Section<'_>, reader: &mut Reader<'_>, rate: Bit
     let sensor = section.table(reader, "sensor").map(|inner| sensor(inner, reader));
     let preset_value = section.optional(reader, "preset_value", number(i32::MIN..=i32::MAX));
     let resolution = section.table(reader, "resolution").and_then(|inner| resolution(inner, reader));
+    let ms2_connections = section.optional(reader, "ms2_connections", number(0..=49));
     UnitOptions {
         clock_tolerance: clock_tolerance.unwrap_or(usual.clock_tolerance),
         pll: pll.unwrap_or(usual.pll),
@@ -51,6 +52,7 @@ pub(super) fn read(section: &mut Section<'_>, reader: &mut Reader<'_>, rate: Bit
         sensor: sensor.unwrap_or(usual.sensor),
         preset_value: preset_value.unwrap_or(usual.preset_value),
         resolution,
+        ms2_connections: ms2_connections.unwrap_or(usual.ms2_connections),
     }
 }
 

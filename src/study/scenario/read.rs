@@ -1,24 +1,46 @@
 //! The tree of a scenario becomes a [`Scenario`], table by table and key by key.
 
+use super::acyclic;
+use super::class1;
+use super::class2;
 use super::error::Fault;
+use super::gsd;
 use super::kinds::{self, ACTIONS, DISTURBANCES, Kind, address};
+use super::link::link;
 use super::options;
-use super::section::{Reader, Section, choice, cycle_time, instant, number, quantity, suggestion, text, yes};
+use super::section::{Reader, Section, cycle_time, instant, number, quantity, suggestion, text, yes};
+use super::services;
+use super::topology::{self, cable, spread, station_segment};
 use super::tree::{Node, Place, Table, Value};
 use super::{
-    Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Link, Master, Record, Run, Scaling,
-    Scenario, Slave, Watchdog, When,
+    Action, Bus, CodeSequence, Crystal, CsvTable, Disturbance, Event, Extent, IsoTimes, Master, Record, Run, Scaling,
+    Scenario, Slave, Topology, Watchdog, When,
 };
-use crate::device::profile::{PROFILES, Profile};
+use crate::device::profile::Profile;
+use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
 use crate::sim::motion::{Angle, Motion};
 use crate::sim::noise::GcJitter;
-use crate::study::quantity::{bit_rate, millimetres, ppb, tbit};
+use crate::study::plan::Plan;
+use crate::study::quantity::{bit_rate, ppb, tbit};
 use crate::time::{BitRate, Span, Tbit};
 use crate::wire::Address;
 
 /// The tables of a file; the second half is lists, `[[slave]]`.
-const TABLES: [&str; 8] = ["run", "bus", "master", "record", "slave", "link", "event", "disturbance"];
+const TABLES: [&str; 12] = [
+    "run",
+    "bus",
+    "master",
+    "record",
+    "segment",
+    "repeater",
+    "slave",
+    "class1",
+    "class2",
+    "link",
+    "event",
+    "disturbance",
+];
 /// How many of [`TABLES`] are single tables.
 const SINGLE: usize = 4;
 
@@ -39,34 +61,50 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
     let run = run(Section::of_file(reader, &root, "run"), reader);
     let bus = bus(Section::of_file(reader, &root, "bus"), reader);
     let rate = bus.map_or(BitRate::M12, |bus| bus.params.rate);
+    let topology = topology::read(reader, &root, rate, bus.map_or(0, |bus| bus.cable_mm));
     let section = Section::of_file(reader, &root, "master");
-    let (master, times) = master(section, reader, rate).unzip();
-    let cable_mm = bus.map_or(0, |bus| bus.cable_mm);
-    let count = slave_tables.len();
-    let mut slaves = Vec::with_capacity(count);
+    let (master, times) = master(section, reader, rate, topology.as_ref()).unzip();
+    let tables = slave_tables.iter().map(|slave| &slave.table);
+    let positions = topology.as_ref().map(|topology| spread(topology, tables)).unwrap_or_default();
+    let mut slaves = Vec::with_capacity(slave_tables.len());
     for (index, table) in slave_tables.iter().enumerate() {
-        // Spread evenly, the last one at the end.
-        let position_mm = cable_mm * (index as u64 + 1) / count as u64;
-        let context = Context { bus: bus.as_ref(), times: times.as_ref(), position_mm };
+        let position_mm = positions.get(index).copied().unwrap_or(0);
+        let context = Context {
+            bus: bus.as_ref(),
+            master: master.as_ref(),
+            topology: topology.as_ref(),
+            times: times.as_ref(),
+            position_mm,
+        };
         slaves.extend(slave(reader, table, &context));
     }
     let addresses: Vec<_> = slave_tables.iter().map(|table| table.address).collect();
+    let class1 = list(reader, &root, "class1", |section, reader| class1::read(section, reader, topology.as_ref()));
+    let class2 =
+        list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses, topology.as_ref()));
     let links = list(reader, &root, "link", link);
     let events = list(reader, &root, "event", |section, reader| event(section, reader, &addresses));
     let disturbances = list(reader, &root, "disturbance", disturbance);
     let record = record(Section::of_file(reader, &root, "record"), reader);
-    Some(Scenario {
+    let mut scenario = Scenario {
         name: String::new(),
         question: String::new(),
         run: run?,
         bus: bus?,
+        topology: topology?,
         master: master?,
+        class1,
         slaves,
+        class2,
         links,
         events,
         disturbances,
         record,
-    })
+    };
+    if let Pace::Free { least } = scenario.master.pace {
+        scenario.master.t_dp = Plan::of(&scenario).content().max(least);
+    }
+    Some(scenario)
 }
 
 /// Complains about tables that nothing is known of.
@@ -100,7 +138,7 @@ fn tables<'t>(reader: &mut Reader<'_>, root: &'t Table, name: &str) -> Vec<(Plac
 }
 
 /// Reads the list `name` with `read`, entry by entry.
-fn list<T>(
+pub(super) fn list<T>(
     reader: &mut Reader<'_>,
     root: &Table,
     name: &str,
@@ -287,24 +325,29 @@ fn bus(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Bus> {
     for (key, value) in numbers {
         *value = section.optional(reader, key, number(0..=u8::MAX)).unwrap_or(*value);
     }
+    let t_tr = section.optional(reader, "t_tr", quantity("100000 tbit", tbit));
+    params.t_tr = t_tr.unwrap_or_else(|| BusParams::usual_t_tr(params.hsa.max(1)));
     let cable_mm = section.optional(reader, "cable", cable).unwrap_or(0);
     section.finish(reader);
     rate.map(|_| Bus { params, cable_mm })
 }
 
-/// A length of cable (mm).
-fn cable(node: &Node) -> Result<u64, Fault> {
-    match quantity("100 m", millimetres)(node)? {
-        mm if mm > Bus::MAX_CABLE_MM => Err(Fault::new("no cable is longer than 100 km")),
-        mm => Ok(mm),
-    }
-}
-
 /// Reads `[master]`: the master and the times that all slaves inherit.
-fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> Option<(Master, Times)> {
+fn master(
+    mut section: Section<'_>,
+    reader: &mut Reader<'_>,
+    rate: BitRate,
+    topology: Option<&Topology>,
+) -> Option<(Master, Times)> {
     let s = &mut section;
     let address = s.required(reader, "address", "2", address);
-    let t_dp = s.required(reader, "t_dp", "\"2 ms\"", cycle_time(rate));
+    let pace = class1::pace(s, reader);
+    let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
+    let t_dp = match pace {
+        Pace::Synch => s.required(reader, "t_dp", "\"2 ms\"", cycle_time(rate)),
+        // The planned cycle, once the slaves are known.
+        Pace::Free { .. } => s.optional(reader, "t_dp", cycle_time(rate)).or(Some(Span::ZERO)),
+    };
     let t_mapc = s.optional(reader, "t_mapc", number(0..=u8::MAX)).unwrap_or(1);
     let times = Times::read(reader, s, rate);
     let watchdog = s.optional(reader, "watchdog", watchdog).unwrap_or(Some(Watchdog { factor_1: 20, factor_2: 1 }));
@@ -313,6 +356,7 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
     let lost_after = s.optional(reader, "lost_after", number(1..=u32::from(u16::MAX))).unwrap_or(10);
     let clear_for = s.optional(reader, "clear_for", number(0..=i64::MAX as u64)).unwrap_or(0);
     let crystal = crystal(reader, s);
+    let segment = station_segment(s, reader, topology);
     let position_mm = s.optional(reader, "position", cable).unwrap_or(0);
     let jitter = s.table(reader, "gc_jitter");
     let (gc_jitter, accumulate) =
@@ -320,12 +364,17 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
     let life_start = s.optional(reader, "life_start", number(1..=15)).unwrap_or(1);
     let life_delay = s.optional(reader, "life_delay", number(0..=u32::MAX)).unwrap_or(0);
     let active_spare = s.optional(reader, "active_spare", yes).unwrap_or(false);
+    let ms1_timeout = s.optional(reader, "ms1_timeout", acyclic::timeout).unwrap_or(acyclic::RESPONSE_TIMEOUT);
+    let services = services::master(s, reader);
     section.finish(reader);
     let (address, t_dp) = (address?, t_dp?);
     let master = Master {
         address,
+        segment,
         position_mm,
         crystal,
+        pace,
+        powered_at,
         t_dp,
         t_mapc,
         watchdog,
@@ -338,6 +387,8 @@ fn master(mut section: Section<'_>, reader: &mut Reader<'_>, rate: BitRate) -> O
         life_start,
         life_delay,
         active_spare,
+        ms1_timeout,
+        services,
     };
     Some((master, times))
 }
@@ -371,7 +422,7 @@ impl Times {
 }
 
 /// A watchdog; `"0 ms"` is none.
-fn watchdog(node: &Node) -> Result<Option<Watchdog>, Fault> {
+pub(super) fn watchdog(node: &Node) -> Result<Option<Watchdog>, Fault> {
     let wanted = instant(node)?;
     if wanted == Span::ZERO {
         return Ok(None);
@@ -389,7 +440,7 @@ fn watchdog(node: &Node) -> Result<Option<Watchdog>, Fault> {
 }
 
 /// A crystal: `"50 ppm"` or `{ within = "50 ppm" }`.
-fn crystal(reader: &mut Reader<'_>, section: &mut Section<'_>) -> Crystal {
+pub(super) fn crystal(reader: &mut Reader<'_>, section: &mut Section<'_>) -> Crystal {
     let is_table = matches!(section.node("crystal"), Some(Node { value: Value::Table(_), .. }));
     if !is_table {
         let offset = section.optional(reader, "crystal", quantity("50 ppm", ppb));
@@ -408,6 +459,8 @@ fn crystal(reader: &mut Reader<'_>, section: &mut Section<'_>) -> Crystal {
 /// What a slave inherits.
 struct Context<'a> {
     bus: Option<&'a Bus>,
+    master: Option<&'a Master>,
+    topology: Option<&'a Topology>,
     times: Option<&'a Times>,
     position_mm: u64,
 }
@@ -417,13 +470,17 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let rate = context.bus.map_or(BitRate::M12, |bus| bus.params.rate);
     let mut section = Section::new(format!("slave.{}", from.address), from.place, Some(&from.table));
     let s = &mut section;
-    let device = s.required(reader, "device", &format!("\"{}\"", PROFILES[0].name), |node| {
-        choice(node, "device", PROFILES, |profile| profile.name)
-    });
+    let kind = gsd::device(s, reader);
+    let segment = station_segment(s, reader, context.topology);
     let position_mm = s.optional(reader, "position", cable).unwrap_or(context.position_mm);
     let crystal = crystal(reader, s);
     let t_sdr = s.optional(reader, "t_sdr", quantity("30 tbit", tbit));
     let own = Times::read(reader, s, rate);
+    let master = s.optional(reader, "master", address).or(context.master.map(|master| master.address));
+    let clocked = context.master.is_none_or(|own| own.pace == Pace::Synch && master == Some(own.address));
+    if !clocked {
+        class1::refuse_times(s, reader);
+    }
     let standstill = Motion::Standstill { at: Angle::ZERO };
     let motion = match s.table(reader, "motion") {
         Some(inner) => kinds::motion(inner, reader)?,
@@ -438,13 +495,21 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let functions = s.optional(reader, "functions", yes).unwrap_or(scaling.is_some());
     let silent = s.optional(reader, "silent", yes).unwrap_or(false);
     let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
+    let user_prm = gsd::user_prm(kind.as_ref(), s, reader);
+    let services = services::slave(s, reader);
     section.finish(reader);
-    let times = iso_times(reader, from, own.or(context.times), context.times.is_some());
-    let (device, bus) = (device?, context.bus?);
-    let t_sdr = t_sdr.unwrap_or_else(|| default_t_sdr(bus, device));
-    Some(Slave {
+    let times = if clocked {
+        iso_times(reader, from, own.or(context.times), context.times.is_some())
+    } else {
+        Some(class1::UNCLOCKED)
+    };
+    let (device, bus) = (kind?.device, context.bus?);
+    let t_sdr = t_sdr.unwrap_or_else(|| default_t_sdr(bus, &device));
+    let mut slave = Slave {
         address: from.address,
+        master: master?,
         device,
+        segment,
         position_mm,
         crystal,
         t_sdr,
@@ -456,8 +521,14 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
         scaling,
         silent,
         powered_at,
+        services,
         options,
-    })
+        user_prm: Vec::new(),
+    };
+    if let Some(user_prm) = user_prm {
+        user_prm.apply(&mut slave);
+    }
+    Some(slave)
 }
 
 /// The times in force; T_I and T_O must come from the slave or from `[master]`, if that could be read (`master`).
@@ -502,17 +573,6 @@ fn scaling(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Scaling>
     Some(Scaling { units_per_rev: units_per_rev?, total_range: total_range? })
 }
 
-/// Reads one `[[link]]`.
-fn link(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Link> {
-    let publisher = section.required(reader, "publisher", "3", address);
-    let subscriber = section.required(reader, "subscriber", "11", address);
-    // G1_XIST1 of telegram 81 (manual 2.2).
-    let offset = section.optional(reader, "offset", number(0..=u8::MAX)).unwrap_or(4);
-    let length = section.optional(reader, "length", number(0..=u8::MAX)).unwrap_or(4);
-    section.finish(reader);
-    Some(Link { publisher: publisher?, subscriber: subscriber?, offset, length })
-}
-
 /// Reads one `[[event]]`; `all` are the addresses of all slaves.
 fn event(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> Option<Event> {
     let s = &mut section;
@@ -523,21 +583,28 @@ fn event(mut section: Section<'_>, reader: &mut Reader<'_>, all: &[Address]) -> 
         s.complain(reader, fault.help("for example: at = \"1 s\", or cycle = 500"));
     }
     let action = Kind::read(ACTIONS, "action", "do", s, reader)?;
-    let slaves = if action.about_slaves() { Some(targets(reader, s, all)) } else { None };
+    let power = matches!(action, Action::PowerOff | Action::PowerOn);
+    let slaves = if power && s.has("station") {
+        s.optional(reader, "station", address).map(|station| vec![station])
+    } else if action.about_slaves() {
+        Some(targets("event", reader, s, all))
+    } else {
+        None
+    };
     section.finish(reader);
     let when = at.map(When::Time).or(cycle.map(When::Cycle))?;
     Some(Event { when, slaves: slaves.unwrap_or_default(), action })
 }
 
 /// The slaves that an event is about.
-fn targets(reader: &mut Reader<'_>, section: &mut Section<'_>, all: &[Address]) -> Vec<Address> {
+pub(super) fn targets(noun: &str, reader: &mut Reader<'_>, section: &mut Section<'_>, all: &[Address]) -> Vec<Address> {
     let one = section.optional(reader, "slave", address);
     let many = section.optional(reader, "slaves", |node| match &node.value {
         Value::Text(text) if text.trim() == "all" => Ok(all.to_vec()),
         _ => address_list(node),
     });
     if section.has("slave") == section.has("slaves") {
-        let fault = Fault::new("this event needs either slave or slaves");
+        let fault = Fault::new(format!("this {noun} needs either slave or slaves"));
         section.complain(reader, fault.help("for example: slave = 3, slaves = \"3..10\", or slaves = \"all\""));
     }
     one.into_iter().chain(many.into_iter().flatten()).collect()

@@ -14,13 +14,15 @@ pub(super) struct Reader<'a> {
     pub(super) source: &'a Source<'a>,
     /// Place of each key's value that was given, by the key's path.
     pub(super) places: BTreeMap<String, Place>,
+    /// GSD files that were read for it.
+    pub(super) gsd_files: super::gsd::Files,
     problems: Vec<(Place, String, Fault)>,
 }
 
 impl<'a> Reader<'a> {
     /// A reader of `source` that has read nothing yet.
     pub(super) const fn new(source: &'a Source<'a>) -> Self {
-        Self { source, places: BTreeMap::new(), problems: Vec::new() }
+        Self { source, places: BTreeMap::new(), gsd_files: BTreeMap::new(), problems: Vec::new() }
     }
     /// Notes that `key` at `place` is wrong. The same fault of the same value, shared by several slaves, is noted once.
     pub(super) fn complain(&mut self, place: Place, key: &str, fault: Fault) {
@@ -40,6 +42,10 @@ impl<'a> Reader<'a> {
     /// The place of the first of `keys` that was given.
     pub(super) fn place(&self, keys: &[&str]) -> Place {
         keys.iter().find_map(|&key| self.places.get(key).copied()).unwrap_or(Place::Missing)
+    }
+    /// Whether anything is wrong so far.
+    pub(super) fn has_problems(&self) -> bool {
+        !self.problems.is_empty()
     }
     /// All problems in the order of the file, and forgets them.
     pub(super) fn take_problems(&mut self) -> Vec<Problem> {
@@ -155,7 +161,7 @@ impl<'t> Section<'t> {
 }
 
 /// "did you mean ..." if one of `known` is near `word`.
-fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<String> {
+pub(in crate::study) fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<String> {
     // Nothing long is near, and the distance of long words takes long.
     let word: String = word.chars().take(60).collect::<String>().to_lowercase().replace('_', "-");
     let distance = |name: &str| strsim::damerau_levenshtein(&word, &name.replace('_', "-"));

@@ -3,6 +3,7 @@
 use super::error::{Fault, Position, Problem, ScenarioError};
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -77,6 +78,8 @@ pub(super) struct Set {
 pub(super) struct Source<'a> {
     name: &'a str,
     text: &'a str,
+    /// Where files are that the text names without a directory: where its own is.
+    pub(super) dir: &'a Path,
     pub(super) sets: Vec<Set>,
 }
 
@@ -88,7 +91,11 @@ impl<'a> Source<'a> {
             text: format!("{key}={value}"),
             node: override_value(value, Place::Set(index)),
         };
-        Self { name, text, sets: overrides.iter().enumerate().map(set).collect() }
+        Self { name, text, dir: Path::new(""), sets: overrides.iter().enumerate().map(set).collect() }
+    }
+    /// The same with the files that the text names in `dir`.
+    pub(super) fn in_dir(self, dir: &'a Path) -> Self {
+        Self { dir, ..self }
     }
     /// Reads the text.
     ///

@@ -1,0 +1,115 @@
+//! Rules that a network should keep, though it runs without.
+
+use super::{Facts, Findings, stray};
+use crate::device::position;
+use crate::study::plan::finding::{Amount, Key, Relation};
+use crate::study::scenario::Fault;
+use crate::time::{BitRate, Span};
+
+/// Drives that do not offer isochronous mode below 1.5 Mbit/s make it a risk there.
+pub(super) fn isochronous_rate(facts: &Facts<'_>, found: &mut Findings) {
+    let rate = facts.scenario.bus.params.rate;
+    let drives: Vec<_> =
+        facts.slaves().filter(|slave| slave.device.subscriber).map(|slave| slave.address.to_string()).collect();
+    let here = match drives.as_slice() {
+        [] => "no drive is in this network".to_owned(),
+        drives => format!("this network's drives are at {}", drives.join(", ")),
+    };
+    let bound = ("isochronous mode of drives", Amount::Rate(BitRate::M1_5));
+    found.check(Key::bus("rate"), Amount::Rate(rate), Relation::AtLeast, bound, || {
+        Fault::new(format!(
+            "isochronous mode at {rate}: drives such as SIMODRIVE 611 universal do not offer it; {here}"
+        ))
+        .rule("drives offer isochronous mode from 1.5 Mbit/s on (SIMODRIVE 611 universal manual)")
+        .help("rate = \"1.5 Mbit/s\" or more")
+    });
+    found.of("bit rate", Some(Amount::Rate(BitRate::M1_5)));
+}
+
+/// A narrower window is raised silently.
+pub(super) fn window_is_taken(facts: &Facts<'_>, found: &mut Findings) {
+    for slave in facts.slaves() {
+        let (t_pll_w, least) = (slave.times.t_pll_w, slave.options.pll.min_window.max(slave.device.min_window));
+        let key = Key::slave(slave.address, "t_pll_w");
+        found.check(key, t_pll_w, Relation::AtLeast, ("the device's narrowest", least), || {
+            Fault::new(format!("T_PLL_W = {t_pll_w} of slave {} counts as {least}", slave.address))
+                .rule("a window below the device's narrowest is raised without a word (manual 3.3.8)")
+                .help(format!("t_pll_w = \"{least}\""))
+        });
+    }
+}
+
+/// One SYNCH may be early and the next late: the loop follows the mean of both.
+pub(super) fn jitter_within_window(facts: &Facts<'_>, found: &mut Findings) {
+    let Some((stray, words)) = stray(facts.scenario.master.gc_jitter) else { return };
+    for slave in facts.slaves() {
+        let (t_pll_w, twice) = (slave.times.t_pll_w, stray * 2);
+        let key = Key::slave(slave.address, "t_pll_w");
+        found.check(key, t_pll_w, Relation::AtLeast, ("2 x jitter of SYNCH", twice), || {
+            Fault::new(format!("jitter of {stray} ({words}) is more than half of T_PLL_W of slave {}", slave.address))
+                .rule("2 x jitter <= T_PLL_W: one SYNCH may be early and the next late (Model: D1, D11)")
+                .help(format!("t_pll_w = \"{twice}\" or more, up to the device's widest"))
+        });
+    }
+}
+
+pub(super) fn seamless(facts: &Facts<'_>, found: &mut Findings) {
+    for slave in facts.slaves() {
+        let Some(scaling) = slave.scaling.filter(|scaling| scaling.total_range > 0) else { continue };
+        let revolutions = slave.resolution().revolutions;
+        let (units, range) = (scaling.units_per_rev, scaling.total_range);
+        let positions = u64::from(units) * u64::from(revolutions);
+        let as_device = position::Scaling { units_per_rev: units, total_range: range };
+        let key = Key::slave(slave.address, "scaling.total_range");
+        let terms = format!("total range {range}");
+        found.check(key, Amount::Count(positions as i64), Relation::MultipleOf, (terms, range), || {
+            Fault::new(format!("the position of slave {} jumps after {revolutions} revolutions", slave.address))
+                .rule(format!("{units} units x {revolutions} revolutions = n x total range (Model: D22)"))
+        });
+        debug_assert_eq!(found.all.last().map(super::Finding::holds), Some(as_device.is_seamless(revolutions)));
+        found.of("units x revolutions", nearest_divisor(positions, range).map(|range| Amount::Count(range.into())));
+    }
+}
+
+/// The divisor of `number` nearest to `wanted`.
+fn nearest_divisor(number: u64, wanted: u32) -> Option<u32> {
+    let root = (1..).take_while(|small: &u64| small * small <= number);
+    let pairs = root.filter(|small| number.is_multiple_of(*small)).flat_map(|small| [small, number / small]);
+    pairs.filter_map(|divisor| u32::try_from(divisor).ok()).min_by_key(|divisor| divisor.abs_diff(wanted))
+}
+
+pub(super) fn repeats_fit(facts: &Facts<'_>, found: &mut Findings) {
+    let (scenario, plan) = (facts.scenario, &facts.plan);
+    if scenario.master.dx_retries == 0 || plan.slots.is_empty() {
+        return;
+    }
+    let repeat = plan.repeat(&scenario.bus.params);
+    let (t_dp, needed) = (scenario.master.t_dp, plan.content() + repeat);
+    found.check(Key::master("t_dp"), t_dp, Relation::AtLeast, ("content + T_S + T_SL + T_ID1", needed), || {
+        Fault::new(format!("one repeated Data_Exchange, {repeat}, does not fit into the spare time"))
+            .rule("T_DP >= content + T_S + T_SL + T_ID1; without, SYNCH is late after a lost telegram (Model: D7)")
+            .help("dx_retries = 0, or a longer t_dp")
+    });
+    found.of("T_DP", None);
+}
+
+pub(super) fn drive_cycles(facts: &Facts<'_>, found: &mut Findings) {
+    drive(facts, found, |_, t_dx| t_dx, "T_DX + 2 x T_BASE_IO", 2);
+}
+
+pub(super) fn drive_instants(facts: &Facts<'_>, found: &mut Findings) {
+    drive(facts, found, |times, _| times, "T_I + T_O + T_BASE_IO", 1);
+}
+
+/// T_DP is so many steps longer than T_I + T_O or T_DX of every drive, whichever `of` takes.
+fn drive(facts: &Facts<'_>, found: &mut Findings, of: fn(Span, Span) -> Span, terms: &str, steps: i64) {
+    let t_dp = facts.scenario.master.t_dp;
+    for slave in facts.slaves().filter(|slave| slave.device.subscriber) {
+        let needed = of(slave.times.t_i + slave.times.t_o, facts.plan.t_dx) + slave.device.io_grid() * steps;
+        found.check(Key::master("t_dp"), t_dp, Relation::AtLeast, (terms, needed), || {
+            Fault::new(format!("T_DP = {t_dp} is short for drive {}", slave.address))
+                .rule(format!("T_DP >= {terms} = {needed} (SINAMICS, alarm A01902)"))
+        });
+        found.of("T_DP", None);
+    }
+}
