@@ -12,6 +12,7 @@ use isodp::sim::queue::NearQueue;
 use isodp::study::gsd::Gsd;
 use isodp::study::plan::command::{Call, answer};
 use isodp::study::plan::rules::warnings;
+use isodp::study::replay::{Window, replay};
 use isodp::study::run::{Outcome, Progress, run};
 use isodp::study::scenario::{Extent, Scenario};
 use isodp::study::{devices, report};
@@ -30,6 +31,8 @@ Examples:
       The same with other draws, files under /tmp/results/reference/.
   isodp plan scenarios/reference.toml
       What its bus cycle will be and whether its times keep the rules; --propose shows times that do.
+  isodp replay scenarios/reference.toml --cycle 200 --window 2
+      Cycles 198 to 202 of the run once more, every telegram and what stations saw, line by line.
   isodp devices posital-ocd-dpb1b
       What the profile of this device says; without a name, all devices.
   isodp gsd scenarios/gsd/isodp_posital_06df.gsd
@@ -55,6 +58,9 @@ enum Command {
     /// Reckons what a scenario's bus cycle will be, and which rules its times keep, without simulating it.
     #[command(after_help = EXAMPLES)]
     Plan(PlanArgs),
+    /// Runs a scenario again and tells a stretch of it, every telegram and every observation, line by line.
+    #[command(after_help = EXAMPLES)]
+    Replay(ReplayArgs),
     /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
     /// Shows what a GSD file says, what of it is ignored and what does not fit.
@@ -95,6 +101,25 @@ struct PlanArgs {
 }
 
 #[derive(Args)]
+struct ReplayArgs {
+    /// Scenario file (TOML).
+    #[arg(value_name = "FILE")]
+    scenario: PathBuf,
+    /// The cycle in the middle.
+    #[arg(long, value_name = "C")]
+    cycle: u64,
+    /// How many cycles before and after it are told too.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    window: u64,
+    /// Seed of all random streams, instead of the scenario's.
+    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
+    seed: Option<u64>,
+    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    sets: Vec<(String, String)>,
+}
+
+#[derive(Args)]
 struct RunArgs {
     /// Scenario file (TOML).
     #[arg(value_name = "FILE")]
@@ -125,6 +150,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(args) => run_command(args).map(done),
         Command::Plan(args) => plan_command(args),
+        Command::Replay(args) => replay_command(args).map(done),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
         Command::Gsd(args) => gsd_command(&args.file).map(done),
     };
@@ -155,9 +181,7 @@ fn show(page: &str) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn run_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
-    let mut sets = args.sets;
-    sets.extend(args.seed.map(|seed| ("run.seed".to_owned(), seed.to_string())));
-    let scenario = Scenario::load(&args.scenario, &sets)?;
+    let scenario = Scenario::load(&args.scenario, &with_seed(args.sets, args.seed))?;
     for warning in warnings(&scenario) {
         // Where standard error is gone, the summary tells.
         let _ = writeln!(anstream::stderr(), "warning: {warning}");
@@ -177,6 +201,17 @@ fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error
 
 fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
     Ok(name.map_or_else(|| Ok(devices::list()), devices::full)?)
+}
+
+fn replay_command(args: ReplayArgs) -> Result<String, Box<dyn std::error::Error>> {
+    let scenario = Scenario::load(&args.scenario, &with_seed(args.sets, args.seed))?;
+    Ok(replay::<NearQueue<NetworkEvent>>(&scenario, Window::around(args.cycle, args.window))?)
+}
+
+/// Overrides with that of the seed, where one is given.
+fn with_seed(mut sets: Vec<(String, String)>, seed: Option<u64>) -> Vec<(String, String)> {
+    sets.extend(seed.map(|seed| ("run.seed".to_owned(), seed.to_string())));
+    sets
 }
 
 fn gsd_command(file: &Path) -> Result<String, Box<dyn std::error::Error>> {

@@ -14,6 +14,7 @@ pub mod metric;
 pub mod plan;
 pub mod plot;
 pub mod quantity;
+pub mod replay;
 pub mod report;
 pub mod row;
 pub mod run;

@@ -117,6 +117,14 @@ impl Sink for Sinks {
     }
 }
 
+/// Where a run of `scenario` ends.
+pub const fn until(scenario: &Scenario) -> Until {
+    match scenario.run.duration {
+        Extent::Time(span) => Until::Time(Time::from_ticks(span.ticks())),
+        Extent::Cycles(cycles) => Until::Cycle(cycles),
+    }
+}
+
 /// Runs `scenario`. Files go to `out/<scenario>/` if `out` is given and the scenario wants any. `watch` is told the
 /// progress now and then; it cannot change the run.
 ///
@@ -141,11 +149,8 @@ pub fn run<Q: Queue<NetworkEvent>>(
 
     let mut network: Network<Node, Q> = build::network(scenario);
     let mut recorder = (Fingerprints::default(), (metrics, bus));
-    let until = match scenario.run.duration {
-        Extent::Time(span) => Until::Time(Time::ZERO + span),
-        Extent::Cycles(cycles) => Until::Cycle(cycles),
-    };
-    while !network.run(until, STRIDE, &mut recorder) {
+    let end = until(scenario);
+    while !network.run(end, STRIDE, &mut recorder) {
         watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
     }
     watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });

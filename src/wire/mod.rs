@@ -136,9 +136,9 @@ pub mod link_status;
 pub mod parameter;
 pub mod prm;
 pub mod telegram;
-pub mod words;
 #[cfg(test)]
 mod vectors;
+pub mod words;
 
 pub use header::{Address, Fcb, FrameControl, Header, Sap, Service, StationType, Status};
 pub use telegram::{Frame, MAX_DU, MAX_FRAME, Telegram, TelegramError};

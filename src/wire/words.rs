@@ -285,20 +285,14 @@ mod tests {
                 "Slave_Diag reply DL: Station_Not_Ready, Prm_Req, ident 80F9, no master",
             ),
             ("68 0B 0B 68 86 82 7D 3E 3E C3 C1 C5 FD 00 51 98 16", "Chk_Cfg, FCB 1: telegram 81"),
-            (
-                "68 07 07 68 06 02 7D 10 00 20 00 B5 16",
-                "Data_Exchange, FCB 1: sign of life 1, G1_STW 2000",
-            ),
+            ("68 07 07 68 06 02 7D 10 00 20 00 B5 16", "Data_Exchange, FCB 1: sign of life 1, G1_STW 2000"),
             (
                 "68 0F 0F 68 02 06 08 30 00 20 00 00 91 A2 80 00 01 23 45 7C 16",
                 "Data_Exchange reply DL: sign of life 3, G1_ZSW 2000, XIST1 0091A280, XIST2 00012345",
             ),
             ("10 06 02 7D 85 16", "Data_Exchange, FCB 1"),
             ("10 02 06 03 0B 16", "Data_Exchange reply RS"),
-            (
-                "68 07 07 68 06 02 77 10 00 20 00 AF 16",
-                "Data_Exchange, FCB 1, MSRD: sign of life 1, G1_STW 2000",
-            ),
+            ("68 07 07 68 06 02 77 10 00 20 00 AF 16", "Data_Exchange, FCB 1, MSRD: sign of life 1, G1_STW 2000"),
             ("68 05 05 68 86 82 7C 33 33 EA 16", "MS1, FCB 1"),
             ("68 09 09 68 86 82 5C 33 33 5E 00 2F F0 47 16", "MS1, FCB 0: read slot 0 index 47, up to 240"),
             ("68 09 09 68 82 86 08 33 33 DE 80 B5 00 89 16", "MS1 reply DL: refused, state conflict"),
@@ -315,6 +309,9 @@ mod tests {
                    00 00 00 00 00 00 00 1C 04 00 00 01 00 00 05 DC 00 10 01 00 00 05 DC 00 01 00 03 00 00 0A 72 00 0C \
                    00 00 9A 16";
         let text = words(hex, None);
-        assert!(text.starts_with("Set_Prm, FCB 0: Lock_Req, WD_On, ident 80F9, min_TSDR 11, watchdog 200 ms"), "{text}");
+        assert!(
+            text.starts_with("Set_Prm, FCB 0: Lock_Req, WD_On, ident 80F9, min_TSDR 11, watchdog 200 ms"),
+            "{text}"
+        );
     }
 }
