@@ -18,6 +18,7 @@ mod manual;
 mod options;
 mod plan;
 mod props;
+mod rates;
 mod replay;
 mod rig;
 mod ring;

@@ -58,6 +58,7 @@ fn every_shipped_scenario_has_a_test_and_says_what_it_asks() {
         crate::dxb::TESTS,
         crate::topology::TESTS,
         crate::ring::TESTS,
+        crate::rates::TESTS,
         crate::gsd::TESTS,
         crate::acyclic::TESTS,
     ];

@@ -319,7 +319,7 @@ fn segments_that_are_wrong_are_named() {
 
 #[test]
 fn long_cables_and_many_repeaters_are_warned_of() {
-    let warnings = |text: &str| parse(text).warnings();
+    let warnings = |text: &str| parse(text).wiring_warnings();
     assert_eq!(warnings(&two("")), Vec::<String>::new());
     let long = two("").replacen("\"100 m\"", "\"101 m\"", 1);
     assert_eq!(

@@ -188,7 +188,7 @@ fn conclude(
     if scenario.topology.has_segments() {
         summary.topology = map.text(false);
     }
-    summary.warnings = [scenario.warnings(), rules::warnings(scenario)].concat();
+    summary.warnings = rules::warnings(scenario);
 
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {

@@ -13,7 +13,6 @@
 //! within T_SL of a token that it got, since its sender listens so long.
 
 use super::{Application, Master, Part, STATUS_OCTETS};
-use crate::dp::handler::Handler;
 use crate::fdl::{Outbox, Timer};
 use crate::observation::Observation;
 use crate::time::{Local, Span};
@@ -36,7 +35,8 @@ pub enum Pace {
 pub(super) struct Polling {
     /// The slave with which it goes on, where T_TH was over.
     stopped_at: Option<usize>,
-    /// First instant of the next cycle.
+    /// When the last cycle began, and the first instant of the next one by the least cycle time.
+    began: Local,
     next: Local,
     /// Token visits.
     visits: u64,
@@ -46,7 +46,7 @@ pub(super) struct Polling {
 
 impl Polling {
     pub(super) const fn new() -> Self {
-        Self { stopped_at: None, next: Local::ZERO, visits: 0, open: false }
+        Self { stopped_at: None, began: Local::ZERO, next: Local::ZERO, visits: 0, open: false }
     }
 }
 
@@ -99,7 +99,7 @@ impl<A: Application> Master<A> {
             }
             Pace::Free { least } => {
                 self.active.not_before(now);
-                self.polling.next = now + least;
+                (self.polling.began, self.polling.next) = (now, now + least);
                 (cycle, now)
             }
         }
@@ -193,15 +193,19 @@ impl<A: Application> Master<A> {
             }
         }
     }
-    /// The least cycle time is over, and Min_Slave_Interval of every slave: none makes the master wait with the token.
+    /// First instant of the next cycle: from start to start at least the least cycle time, and the longest
+    /// Min_Slave_Interval of the slaves that take part (EN 50170-2, bus parameters).
     fn next_start(&self) -> Local {
         let exchanging = self.handlers.iter().filter(|handler| handler.exchanges());
-        exchanging.filter_map(Handler::earliest).fold(self.polling.next, Local::max)
+        let longest = exchanging.map(|handler| handler.params().min_interval).max();
+        self.polling.next.max(self.polling.began + longest.unwrap_or(Span::ZERO))
     }
-    /// Whether T_TH is over before Data_Exchange with `slave`: then the token goes on, and later so does the cycle.
+    /// Whether T_TH is over before Data_Exchange with `slave`, or the slave may not be asked again for longer than T_SL,
+    /// because the token was away between it and those before it: then the token goes on, and later so does the cycle.
     pub(super) fn stops_before(&mut self, slave: usize, now: Local, out: &mut Outbox) -> bool {
         let at = self.active.free_at().max(now);
-        let stops = self.is_free() && !self.is_alone() && !self.active.may_high(at);
+        let too_early = self.handlers[slave].earliest().is_some_and(|earliest| earliest > at + self.t_sl());
+        let stops = self.is_free() && !self.is_alone() && (too_early || !self.active.may_high(at));
         if stops {
             self.polling.stopped_at = Some(slave);
             self.token(out);

@@ -169,11 +169,13 @@ impl<'a> Facts<'a> {
     }
 }
 
-/// What a run of `scenario` has to tell: broken rules of weight [`Weight::Warning`], a sentence each.
+/// What a run of `scenario` has to tell: what its wiring should not have, and broken rules of weight [`Weight::Warning`]; a
+/// sentence each.
 pub fn warnings(scenario: &Scenario) -> Vec<String> {
     let facts = Facts::of(scenario);
     let rules = ALL.iter().copied().flatten().filter(|rule| rule.weight == Weight::Warning);
-    rules.flat_map(|rule| rule.findings(&facts)).filter_map(|found| found.fault).map(|fault| sentence(&fault)).collect()
+    let broken = rules.flat_map(|rule| rule.findings(&facts)).filter_map(|found| found.fault);
+    scenario.wiring_warnings().into_iter().chain(broken.map(|fault| sentence(&fault))).collect()
 }
 
 /// A fault in one line.

@@ -201,7 +201,7 @@ impl Scenario {
         stations + ends.filter(|end| end.segment == segment).count()
     }
     /// What a network like this should not have, but may: a sentence each.
-    pub fn warnings(&self) -> Vec<String> {
+    pub fn wiring_warnings(&self) -> Vec<String> {
         let rate = self.bus.params.rate;
         let limit = longest_cable_mm(rate);
         let long = self.topology.segments.iter().filter(|segment| segment.cable_mm > limit);
