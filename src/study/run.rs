@@ -7,7 +7,7 @@ use super::build;
 use super::count::Counts;
 use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
-use super::layout::{Layout, SlaveLayout};
+use super::layout::{Layout, MasterLayout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
 use super::plan::rules;
 use super::plot::{BusCycle, Distribution, Distributions, LinkLatencies, PlotError, PlotMeta, Plots};
@@ -16,6 +16,7 @@ use super::scenario::{Extent, Scenario};
 use super::summary::{Facts, SlaveFacts, Summary};
 use super::topology::Map;
 use crate::device::node::Node;
+use crate::observation::MasterClass;
 use crate::sim::fingerprint::{Digest, Fingerprint, Fingerprints};
 use crate::sim::motion::Shaft;
 use crate::sim::network::{Network, NetworkEvent, Until};
@@ -219,14 +220,30 @@ fn cycles(scenario: &Scenario) -> u64 {
     }
 }
 
-/// The slaves that take part and their links.
+/// The slaves that take part and their links; the masters, where several share the token.
 pub fn layout(scenario: &Scenario) -> Layout {
     let slaves = scenario.configured();
     let slaves = slaves
         .map(|slave| SlaveLayout { address: slave.address, t_i: slave.times.t_i, encoder: !slave.device.subscriber })
         .collect();
     let links = scenario.links.iter().map(|link| (link.publisher, link.subscriber)).collect();
-    Layout::new(scenario.master.address, scenario.master.t_dp, slaves, links)
+    Layout::new(scenario.master.address, scenario.master.t_dp, slaves, links).with_masters(masters(scenario))
+}
+
+/// Nobody where there is one only.
+fn masters(scenario: &Scenario) -> Vec<MasterLayout> {
+    if scenario.class1.is_empty() && scenario.class2.is_empty() {
+        return Vec::new();
+    }
+    let class1 = std::iter::once(scenario.master.address).chain(scenario.class1.iter().map(|class1| class1.address));
+    let class1 = class1.map(|address| MasterLayout {
+        address,
+        class: MasterClass::One,
+        slaves: scenario.slaves_of(address).map(|slave| slave.address).collect(),
+    });
+    let class2 = scenario.class2.iter();
+    let class2 = class2.map(|tool| MasterLayout { address: tool.address, class: MasterClass::Two, slaves: Vec::new() });
+    class1.chain(class2).collect()
 }
 
 fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {

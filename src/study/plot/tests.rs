@@ -125,6 +125,7 @@ impl World {
             cycle,
             t0,
             gc_jitter: Span::ZERO,
+            synch_delay: None,
             t_dp: Some(meta.t_dp),
             t_dp_deviation: (cycle > 0).then(|| Span::from_ticks(deviation)),
             t_dx: None,
