@@ -138,7 +138,7 @@ pub fn run<Q: Queue<NetworkEvent>>(
     let plots = draws.then(|| Plots::new(meta(scenario, &layout)));
     let sinks = Sinks { histograms: Histograms::new(&layout), exports: exports.transpose()?, plots };
     let metrics = Metrics::new(layout, Speeds::of(scenario), sinks);
-    let bus = draws.then(BusCycle::new);
+    let bus = draws.then(|| BusCycle::new(scenario.master.address));
 
     let mut network: Network<Node, Q> = build::network(scenario);
     let mut recorder = (Fingerprints::default(), (metrics, bus));
@@ -189,7 +189,7 @@ fn conclude(
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {
         pictures = stage(dir, plots.pictures(&distributions(&sinks.histograms), bus)?)?;
-        summary.files.extend(Plots::files().map(str::to_owned));
+        summary.files.extend(plots.files().map(str::to_owned));
     }
     if let Some(dir) = &dir {
         pictures.extend(stage(dir, vec![(TOPOLOGY, map.text(true).join("\n") + "\n")])?);
@@ -253,6 +253,7 @@ fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
         t_dp: scenario.master.t_dp,
         slaves: layout.slaves().iter().map(|slave| slave.address).collect(),
         links: layout.links().to_vec(),
+        masters: 1 + scenario.class1.len() + scenario.class2.len(),
         duration: scenario.master.t_dp * cycles(scenario) as i64,
         topology: Map::of(scenario),
     }
@@ -285,6 +286,7 @@ fn distributions(histograms: &Histograms) -> Distributions {
     Distributions {
         latch_skew: of("latch_skew", Subject::Network),
         t_dp_deviation: of("t_dp_deviation", Subject::Network),
+        synch_delay: of("synch_delay", Subject::Network),
         links: histograms.layout().links().iter().map(link).collect(),
     }
 }
