@@ -5,6 +5,7 @@
 //! | `CycleStart` | a cycle since the one before, unless it was `Offline` in between |
 //! | `ExchangeDone` | T_DX; of a free-running master with all token visits that its poll cycle took |
 //! | `TokenReceived` | a token visit; T_RR from the second one in a row on |
+//! | `TokenClaimed` | a claim: the token was lost, but for the first one of a run |
 //! | `MasterMode` | its mode |
 
 use serde::{Serialize, Serializer};
@@ -33,6 +34,8 @@ pub struct MasterCounts {
     pub rotation: Rotation,
     /// How often it got the token from another station.
     pub visits: u64,
+    /// How often it claimed the token after silence.
+    pub claims: u64,
     /// When the cycle under way began.
     began: Option<Time>,
     /// The cycle before, of which it is not known yet whether the run ends with it.
@@ -49,6 +52,7 @@ impl MasterCounts {
             t_dx_max: None,
             rotation: Rotation::default(),
             visits: 0,
+            claims: 0,
             began: None,
             over: None,
         }
@@ -60,6 +64,7 @@ impl MasterCounts {
             Observation::CycleStart { .. }
                 | Observation::ExchangeDone { .. }
                 | Observation::TokenReceived { .. }
+                | Observation::TokenClaimed
                 | Observation::MasterMode { .. }
         )
     }
@@ -79,6 +84,7 @@ impl MasterCounts {
                     self.rotation.add(t_rr);
                 }
             }
+            Observation::TokenClaimed => self.claims += 1,
             Observation::MasterMode { to, .. } => {
                 self.mode = to;
                 if to == MasterMode::Offline {
@@ -131,6 +137,8 @@ pub struct MasterSummary {
     pub t_dx_max: Option<Span>,
     /// How often it got the token.
     pub token_visits: u64,
+    /// How often it claimed the token after silence.
+    pub tokens_claimed: u64,
     /// Shortest token rotation time T_RR.
     #[serde(rename = "rotation_min_us", serialize_with = "us_or_null")]
     pub rotation_min: Option<Span>,
@@ -164,6 +172,7 @@ impl MasterSummary {
             cycle_max: cycle(cycles.max),
             t_dx_max: master.t_dx_max,
             token_visits: master.visits,
+            tokens_claimed: master.claims,
             rotation_min: round(rotation.min),
             rotation_mean: rotation.mean(),
             rotation_max: round(rotation.max),
@@ -176,7 +185,7 @@ impl MasterSummary {
             self.address.to_string(),
             self.class.to_owned(),
             self.mode.unwrap_or("-").to_owned(),
-            self.slaves.to_string(),
+            if self.lost > 0 { format!("{}, lost {}", self.slaves, self.lost) } else { self.slaves.to_string() },
             span(self.cycle_mean),
             span(self.cycle_max),
             span(self.t_dx_max),
@@ -193,7 +202,7 @@ const HEADER: &[&str] =
 
 /// The masters for the report, a line each below their titles.
 pub(super) fn table(masters: &[MasterSummary]) -> Vec<String> {
-    aligned(HEADER, &[1, 2], &masters.iter().map(MasterSummary::cells).collect::<Vec<_>>())
+    aligned(HEADER, &[1, 2, 3], &masters.iter().map(MasterSummary::cells).collect::<Vec<_>>())
 }
 
 #[allow(clippy::ref_option)] // As serde asks for it.
@@ -278,6 +287,7 @@ mod tests {
         for (us, by, what) in [
             (1, 2, mode(MasterMode::Clear)),
             (2, 2, Observation::Lost { slave: address(5) }),
+            (1, 2, Observation::TokenClaimed),
             (3, 2, start()),
             (1_003, 2, start()),
             (1_100, 9, token(0)),
@@ -291,11 +301,12 @@ mod tests {
         let [offline, clear] = [Some("Offline"), Some("Clear")];
         assert_eq!([of(0), of(1), of(2)], [(1, offline, 0, 0), (2, clear, 1, 0), (9, None, 0, 1)]);
         let expected = "\
-master  class    mode     slaves  cycle mean   max  T_DX max  tokens  T_RR mean  max
-     1  class 1  Offline       1           -     -         -       0          -    -
-     2  class 1  Clear         1        1 ms  1 ms         -       0          -    -
-     9  class 2  -             0           -     -         -       1          -    -";
+master  class    mode     slaves     cycle mean   max  T_DX max  tokens  T_RR mean  max
+     1  class 1  Offline  1                   -     -         -       0          -    -
+     2  class 1  Clear    1, lost 1        1 ms  1 ms         -       0          -    -
+     9  class 2  -        0                   -     -         -       1          -    -";
         assert_eq!(table(&all).join("\n"), expected);
+        assert_eq!([0, 1, 2].map(|number: usize| all[number].tokens_claimed), [0, 1, 0]);
         let json = serde_json::to_value(all[1]).unwrap();
         assert_eq!((json["cycle_time_mean_us"].as_f64(), json["rotation_max_us"].is_null()), (Some(1_000.0), true));
     }

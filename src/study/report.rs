@@ -53,7 +53,12 @@ fn network(summary: &Summary, lines: &mut Vec<String>) {
         range(timing.t_o_min, timing.t_o_max),
         at("from", timing.spare_min),
     ));
+    // The first claim of a run is how the ring begins.
+    let lost_tokens = summary.masters.iter().map(|master| master.tokens_claimed).sum::<u64>().saturating_sub(1);
+    let masters = summary.live_list.iter().filter(|station| station.seen == Seen::Master);
     let happened = [
+        (lost_tokens, "lost token"),
+        (masters.map(|master| master.lost).sum(), "lost master"),
         (counts.faults, "fault"),
         (counts.retries, "retry"),
         (counts.no_answers, "missing answer"),
@@ -78,14 +83,14 @@ fn ring(summary: &Summary, lines: &mut Vec<String>) {
     let delay = summary.distribution("synch_delay").filter(|delay| delay.count > 0);
     lines.push(match delay {
         Some(delay) => format!(
-            "SYNCH waited for the token in {} of {} cycles: p50 {}, p99 {}, max {}; {missed}",
+            "SYNCH late in {} of {} cycles: p50 {}, p99 {}, max {}; {missed}",
             delay.count,
             summary.network.cycles,
             span(delay.p50),
             span(delay.p99),
             span(delay.max),
         ),
-        None => format!("SYNCH never waited for the token; {missed}"),
+        None => format!("SYNCH never late; {missed}"),
     });
 }
 

@@ -37,8 +37,8 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let words = Words {
         title: "SYNCH delay: how late SYNCH was because the token was away",
         subtitle: format!(
-            "{} of {}. Left: {shown}, over time; right: histogram, same axis. A SYNCH in time is not drawn.",
-            plural(counted.count, "late SYNCH"),
+            "SYNCH was late in {} of {}. Left: {shown}, over time; right: histogram, same axis.",
+            counted.count,
             plural(*cycles, "cycle")
         ),
         plotted: "delay of every late SYNCH, over time and histogram",
