@@ -72,7 +72,7 @@ fn summary(scenario: &Scenario) -> Summary {
     run::<NearQueue<NetworkEvent>>(scenario, None, |_| ()).expect("a run without files").summary
 }
 
-/// What an analyser writes beside one slave.
+/// What an analyser writes beside one station.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 struct Analysed {
     lost: u64,
@@ -87,9 +87,9 @@ struct Analysed {
     exchanges: bool,
     /// It may be lost: Set_Prm or Get_Cfg will tell, or Data_Exchange that it is not.
     suspect: bool,
-    /// FCB and FCV of the last request.
-    fcb: Option<u8>,
-    /// DSAP of the last request of DP-V0, and how it was answered.
+    /// FCB and FCV of the last request of each master.
+    fcb: BTreeMap<u8, u8>,
+    /// DSAP of the own master's last request of DP-V0, and how it was answered.
     asked: Option<(Option<u8>, Answered)>,
     here: u64,
 }
@@ -113,18 +113,25 @@ fn header(octets: &[u8]) -> Option<(u8, u8, u8, Option<u8>)> {
     Some((da & 0x7F, sa & 0x7F, fc, (data && da & 0x80 != 0).then_some(first)))
 }
 
+/// Whether a request says nothing of data exchange: MS1, MS2 and its resource manager.
+fn is_acyclic(dsap: Option<u8>) -> bool {
+    dsap.is_some_and(|sap| sap <= 51)
+}
+
 impl Analysed {
-    fn request(&mut self, fc: u8, dsap: Option<u8>) {
+    fn repeat(&mut self) {
+        self.repeats += 1;
+        self.here += 1;
+        self.most = self.most.max(self.here);
+    }
+    fn request(&mut self, by: u8, fc: u8) {
         // FCV = 1 and the same FCB: the telegram again.
-        if fc & 0x10 != 0 && self.fcb == Some(fc & 0x30) {
-            self.repeats += 1;
-            self.here += 1;
-            self.most = self.most.max(self.here);
+        if self.fcb.insert(by, fc & 0x30) == Some(fc & 0x30) && fc & 0x10 != 0 {
+            self.repeat();
         }
-        self.fcb = Some(fc & 0x30);
-        if dsap == Some(51) {
-            return; // MS1 says nothing of data exchange.
-        }
+    }
+    /// A request of the master that exchanges data with it.
+    fn own_request(&mut self, dsap: Option<u8>) {
         match dsap {
             None => {
                 self.syncs += u64::from(self.prepared);
@@ -147,49 +154,94 @@ impl Analysed {
         }
         self.asked = Some((dsap, Answered::Not));
     }
-    fn reply(&mut self, octets: &[u8]) {
-        let Some((dsap, _)) = self.asked else { return };
+    /// Its answer to a request of DP-V0 by any master, `own` or not.
+    fn reply(&mut self, own: bool, dsap: Option<u8>, octets: &[u8]) {
         let status = header(octets).map_or(0, |(_, _, fc, _)| fc & 0x0F);
         let answered = if matches!(status, 0 | 8 | 10) { Answered::Well } else { Answered::Refused };
         self.illegal += u64::from(answered == Answered::Refused && dsap.is_some());
         if answered == Answered::Well && dsap == Some(60) {
             self.diagnoses += 1;
             // Prm_Fault, Cfg_Fault, Not_Supported, Station_Not_Ready; Stat_Diag, Prm_Req.
-            self.suspect |= self.exchanges && (octets[9] & 0x56 != 0 || octets[10] & 0x03 != 0);
+            self.suspect |= own && self.exchanges && (octets[9] & 0x56 != 0 || octets[10] & 0x03 != 0);
         }
-        self.asked = Some((dsap, answered));
+        if own {
+            self.asked = Some((dsap, answered));
+        }
     }
 }
 
-/// Counts what is on the line.
-fn analyse(run: &Run, master: u8) -> BTreeMap<u8, Analysed> {
-    let mut slaves = BTreeMap::<u8, Analysed>::new();
-    let mut last = None;
+/// Tokens that came one after the other with nothing in between.
+#[derive(Clone, Copy, Default)]
+struct Tokens {
+    to: u8,
+    from: u8,
+    times: u32,
+}
+
+/// Counts what is on the line. `owners` are the masters by their slaves, `master` is whose cycles count.
+fn analyse(run: &Run, master: u8, owners: &BTreeMap<u8, u8>) -> BTreeMap<u8, Analysed> {
+    let mut stations = BTreeMap::<u8, Analysed>::new();
+    let (mut last, mut tokens, mut holder) = (None, Tokens::default(), None);
+    // Slaves of a dead master lose nothing when it starts them anew.
+    let died = |stations: &mut BTreeMap<u8, Analysed>, dead: u8| {
+        for (slave, _) in owners.iter().filter(|(_, owner)| **owner == dead) {
+            stations.entry(*slave).or_default().exchanges = false;
+        }
+    };
     for (.., sender, octets) in &run.telegrams {
         let sender = sender.get();
-        if sender == master {
+        // The third token was not taken.
+        if tokens.times == 3 && sender != tokens.to {
+            stations.entry(tokens.to).or_default().lost += 1;
+            died(&mut stations, tokens.to);
+        }
+        if let [0xDC, to, from] = octets[..] {
+            // Claimed after silence.
+            if let Some(dead) = holder.filter(|&holder| to == from && holder != from) {
+                died(&mut stations, dead);
+            }
+            holder = Some(to);
+            let again = (tokens.to, tokens.from) == (to, from) && to != from;
+            tokens = Tokens { to, from, times: if again && tokens.times < 3 { tokens.times + 1 } else { 1 } };
+            if tokens.times > 1 {
+                stations.entry(to).or_default().repeat();
+            }
             last = None;
-            match header(octets) {
+            continue;
+        }
+        tokens = Tokens::default();
+        match header(octets) {
+            Some((da, sa, fc, dsap)) if fc & 0x40 != 0 => {
+                last = None;
                 // SYNCH: Control_Command 00, Group_Select 80.
-                Some((127, ..)) if octets[9..11] == [0x00, 0x80] => {
-                    for slave in slaves.values_mut() {
-                        slave.here = 0;
+                if da == 127 && sa == master && octets[9..11] == [0x00, 0x80] {
+                    stations.values_mut().for_each(|station| station.here = 0);
+                } else if da != 127 && fc & 0x0F != 9 {
+                    let (station, own) = (stations.entry(da).or_default(), owners.get(&da) == Some(&sa));
+                    station.request(sa, fc);
+                    if own && !is_acyclic(dsap) {
+                        station.own_request(dsap);
                     }
+                    last = (!is_acyclic(dsap)).then_some((da, own, dsap));
                 }
-                Some((da, _, fc, dsap)) if da != 127 && fc & 0x0F != 9 => {
-                    slaves.entry(da).or_default().request(fc, dsap);
-                    last = (dsap != Some(51)).then_some(da);
+            }
+            _ => match last {
+                Some((slave, own, dsap)) if slave == sender => {
+                    stations.entry(sender).or_default().reply(own, dsap, octets);
                 }
                 _ => {}
-            }
-        } else if last == Some(sender) {
-            slaves.entry(sender).or_default().reply(octets);
+            },
         }
     }
-    for slave in slaves.values_mut() {
-        slave.lost += u64::from(slave.suspect);
+    for station in stations.values_mut() {
+        station.lost += u64::from(station.suspect);
     }
-    slaves
+    stations
+}
+
+/// The master of each slave.
+fn owners(scenario: &Scenario) -> BTreeMap<u8, u8> {
+    scenario.slaves.iter().map(|slave| (slave.address.get(), slave.master.get())).collect()
 }
 
 fn figures(station: &StationSummary) -> [u64; 6] {
@@ -201,7 +253,7 @@ fn figures(station: &StationSummary) -> [u64; 6] {
 fn the_counters_are_those_of_an_analyser() {
     let scenario = troubled();
     let list = summary(&scenario).live_list;
-    let analysed = analyse(&Run::of(&scenario), MASTER);
+    let analysed = analyse(&Run::of(&scenario), MASTER, &owners(&scenario));
     for station in list.iter().filter(|station| station.address != MASTER) {
         let Analysed { lost, syncs, repeats, most, illegal, diagnoses, .. } = analysed[&station.address];
         let counted = [lost, syncs, repeats, most, illegal, diagnoses];
@@ -254,19 +306,21 @@ fn the_page_and_the_file_show_the_same() {
 /// The same for every shipped scenario. Of a master whose own telegrams never get onto the line an analyser sees less.
 #[test]
 fn the_counters_of_every_shipped_scenario_are_those_of_an_analyser() {
-    let (mut trouble, mut compared) = (0, 0);
+    let (mut trouble, mut compared, mut several) = (0, 0, Vec::new());
     for name in shipped() {
         let scenario = crate::support::scenario(&name, &[]);
         let (list, run) = (summary(&scenario).live_list, Run::of(&scenario));
-        let master = scenario.master.address.get();
-        if run.telegrams.iter().any(|(.., octets)| matches!(**octets, [0xDC, _, sender] if sender != master)) {
-            continue; // Several masters count together.
-        }
+        let masters: Vec<u8> =
+            list.iter().filter(|station| station.seen.text() == "master").map(|station| station.address).collect();
         let disturbed = |what: &Observation| matches!(what, Observation::Disturbed { .. });
-        let unseen = run.observations.iter().any(|(_, who, what)| who.get() == master && disturbed(what));
-        let analysed = analyse(&run, master);
-        for station in list.iter().filter(|station| station.seen.text() != "master") {
-            let Analysed { lost, syncs, repeats, most, illegal, diagnoses, .. } = analysed[&station.address];
+        let unseen = run.observations.iter().any(|(_, who, what)| masters.contains(&who.get()) && disturbed(what));
+        let analysed = analyse(&run, scenario.master.address.get(), &owners(&scenario));
+        if masters.len() > 1 {
+            several.push(name.clone());
+        }
+        for station in &list {
+            let of = analysed.get(&station.address).cloned().unwrap_or_default();
+            let Analysed { lost, syncs, repeats, most, illegal, diagnoses, .. } = of;
             let here = figures(station);
             if unseen {
                 assert!(lost <= here[0] && repeats <= here[2], "{name}: {station:?}");
@@ -279,7 +333,49 @@ fn the_counters_of_every_shipped_scenario_are_those_of_an_analyser() {
         }
     }
     assert!(trouble > 100 && compared > 50, "{trouble} {compared}");
+    for name in ["class2-beside", "gap-entry", "lost-token", "two-masters"] {
+        assert!(several.iter().any(|other| other == name), "{name} has one master only");
+    }
 }
+
+/// A tool asks for what a slave has and what it has not, loses an answer, and is switched off: repeats, diagnoses and
+/// illegal responses of every master count, and tokens that nobody took.
+#[test]
+fn what_a_tool_asks_counts_too() {
+    let text = TROUBLED.replace("[[slave]]\naddress = 7", TOOL);
+    let scenario = Scenario::parse("tool", "tool.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let list = summary(&scenario).live_list;
+    let analysed = analyse(&Run::of(&scenario), MASTER, &owners(&scenario));
+    for station in &list {
+        let Analysed { lost, syncs, repeats, most, illegal, diagnoses, .. } =
+            analysed.get(&station.address).cloned().unwrap_or_default();
+        assert_eq!(figures(station), [lost, syncs, repeats, most, illegal, diagnoses], "{}", station.address);
+    }
+    let of = |address| list.iter().find(|station| station.address == address).map(figures).expect("a station");
+    assert_eq!(of(9)[..3], [1, 0, 2], "two more tokens to the tool, then it is out of the ring");
+    assert!(of(6)[2] > 0 && of(6)[5] > 20, "the tool's repeats and diagnoses: {:?}", of(6));
+}
+
+/// Diagnosis of slave 6 over and over; for some cycles its answers are lost; the tool loses its supply.
+const TOOL: &str = r#"[[class2]]
+address = 9
+[[class2.job]]
+service = "diagnosis"
+slave = 6
+start = "50 ms"
+period = "10 ms"
+[[disturbance]]
+kind = "lost-telegrams"
+from = 6
+service = "any"
+from_cycle = 150
+count = 6
+[[event]]
+cycle = 550
+do = "power-off"
+station = 9
+[[slave]]
+address = 7"#;
 
 /// Requests to slave 3 are lost for longer than its watchdog, but not long enough for the master to give it up.
 #[test]
@@ -295,7 +391,7 @@ fn a_slave_that_its_watchdog_released_says_rs_and_is_lost() {
     let refused = |octets: &[u8]| header(octets).is_some_and(|(da, sa, fc, _)| (da, sa, fc) == (MASTER, 3, 0x03));
     let run = Run::of(&scenario);
     assert_eq!(run.telegrams.iter().filter(|(.., octets)| refused(octets)).count(), 1, "one RS");
-    assert_eq!(analyse(&run, MASTER)[&3].lost, 1);
+    assert_eq!(analyse(&run, MASTER, &owners(&scenario))[&3].lost, 1);
 }
 
 /// Where nothing is disturbed and nobody is told anything, every slave is brought in once and stays.

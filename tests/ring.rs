@@ -104,6 +104,59 @@ fn two_masters() {
     assert!(alone.summary.ring.is_none(), "a station alone has no rotation");
 }
 
+/// The figures of each master against what is taken here from its observations and from the tokens on the line.
+#[test]
+fn every_master_has_its_own_figures() {
+    for name in ["two-masters", "gap-entry", "lost-token", "class2-beside"] {
+        let (run, scenario) = (Run::of(&scenario(name, &[])), scenario(name, &[]));
+        let outcome = run::run::<NearQueue<NetworkEvent>>(&scenario, None, |_| ()).expect("no files");
+        let masters = &outcome.summary.masters;
+        assert!(masters.len() > 1, "{name}");
+        for master in masters {
+            let number = master.address;
+            let tokens = run.telegrams.iter().filter(|(.., octets)| octets[0] == 0xDC && octets[1] == number);
+            let tokens = tokens.filter(|(.., sender, _)| sender.get() != number).count() as u64;
+            // The first token of a newcomer that it does not take yet, and those that a dead one does not hear.
+            assert!((master.token_visits..master.token_visits + 5).contains(&tokens), "{name}: {tokens} to {number}");
+            let mut starts: Vec<Vec<Time>> = vec![Vec::new()];
+            for (at, what) in seen(&run, number) {
+                match what {
+                    Observation::CycleStart { .. } => starts.last_mut().expect("a run").push(at),
+                    Observation::MasterMode { to: MasterMode::Offline, .. } => starts.push(Vec::new()),
+                    _ => {}
+                }
+            }
+            let ended = run.counts.as_ref().map(|counts| Time::ZERO + counts.network.duration);
+            starts.last_mut().expect("a run").retain(|&start| Some(start) != ended);
+            let cycles: Vec<Span> =
+                starts.iter().flat_map(|starts| starts.windows(2).map(|pair| pair[1] - pair[0])).collect();
+            let ends = (cycles.iter().min().copied(), cycles.iter().max().copied());
+            assert_eq!((master.cycle_min, master.cycle_max), ends, "{name}: {number}");
+            assert_eq!(master.class == "class 2", cycles.is_empty(), "{name}: {number}");
+        }
+    }
+}
+
+/// Every late SYNCH is in the distribution, and nothing else; a master alone has none.
+#[test]
+fn the_delay_of_synch_is_a_distribution() {
+    for (name, t_tr) in [("two-masters", "21000 tbit"), ("two-masters", "300000 tbit"), ("gap-entry", "21000 tbit")] {
+        let scenario = scenario(name, &[("bus.t_tr", t_tr)]);
+        let mut late = late(&Run::of(&scenario));
+        late.sort_unstable();
+        let summary = run::run::<NearQueue<NetworkEvent>>(&scenario, None, |_| ()).expect("no files").summary;
+        let delay = summary.distribution("synch_delay").expect("masters share the token");
+        // The SYNCH that begins a cycle after the end of the run is no longer counted.
+        assert!((late.len().saturating_sub(1)..=late.len()).contains(&(delay.count as usize)), "{name} {t_tr}");
+        if late.len() == delay.count as usize {
+            let ends = (late.first().copied(), late.last().copied());
+            assert_eq!((delay.min, delay.max), ends, "{name} {t_tr}");
+        }
+    }
+    let alone = run::run::<NearQueue<NetworkEvent>>(&scenario("gc-loss", &[]), None, |_| ()).expect("no files").summary;
+    assert!(alone.distribution("synch_delay").is_none() && alone.masters.is_empty());
+}
+
 #[test]
 fn a_longer_t_tr_or_more_polls_make_the_delay_of_synch_a_fault() {
     for set in [("bus.t_tr", "22000 tbit"), ("bus.gap_factor", "1"), ("bus.t_tr", "300000 tbit")] {

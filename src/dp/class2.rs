@@ -255,7 +255,10 @@ impl<A: Application> Class2<A> {
     fn was_read(&mut self, now: Local, slave: usize, answer: Result<Option<&[u8]>, Option<Status>>, out: &mut Outbox) {
         match answer {
             Ok(du) => self.done(now, slave, Ok(du.unwrap_or(&[])), AcyclicResult::Positive, out),
-            Err(Some(_)) => self.done(now, slave, Err(Failure::Closed), AcyclicResult::Negative, out),
+            Err(Some(_)) => {
+                out.observe(Observation::IllegalAnswer { slave: self.partners[slave].connection.slave() });
+                self.done(now, slave, Err(Failure::Closed), AcyclicResult::Negative, out);
+            }
             Err(None) => self.done(now, slave, Err(Failure::Timeout), AcyclicResult::Timeout, out),
         }
     }

@@ -121,7 +121,9 @@ impl AcyclicSummary {
         let others = others.concat();
         let [min, mean, max] = [self.response_min, self.response_mean, self.response_max].map(span);
         let Self { class, requests, positive, .. } = self;
-        format!("acyclic, {class}: {requests} requests, {positive} answered{others}; response {min} / {mean} / {max}")
+        format!(
+            "acyclic, {class}: {requests} requests, {positive} answered{others}; response {min} to {max}, mean {mean}"
+        )
     }
 }
 
@@ -150,7 +152,7 @@ mod tests {
         let all = AcyclicSummary::all(&counts);
         assert_eq!(all.len(), 1, "class 1 asked for nothing");
         let line = "acyclic, class 2: 4 requests, 1 answered, 1 negative, 1 without answer in time, 1 connection lost; \
-                    response 100 us / 200 us / 300 us";
+                    response 100 us to 300 us, mean 200 us";
         assert_eq!(all[0].line(), line);
         let json = serde_json::to_value(&all[0]).unwrap();
         assert_eq!((&json["response_mean_us"], &json["requests"]), (&200.0.into(), &4.into()));

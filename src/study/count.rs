@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::acyclic::AcyclicCounts;
 use super::layout::Layout;
 use super::live_list::{CycleTimes, LiveList};
+use super::masters::MasterCounts;
 use crate::observation::{ClockVerdict, Leds, LinkState, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
@@ -22,6 +23,8 @@ pub struct Counts {
     pub acyclic: AcyclicCounts,
     /// Per address, as a bus analyser counts.
     pub live_list: LiveList,
+    /// Per master, in the order of the layout; nobody where there is one only.
+    pub masters: Vec<MasterCounts>,
 }
 
 /// What is counted for the network as a whole.
@@ -74,7 +77,7 @@ pub struct Rotation {
 }
 
 impl Rotation {
-    fn add(&mut self, t_rr: Span) {
+    pub(super) fn add(&mut self, t_rr: Span) {
         self.min = if self.count == 0 { t_rr } else { self.min.min(t_rr) };
         self.max = self.max.max(t_rr);
         self.total += t_rr;
@@ -173,6 +176,7 @@ impl Counts {
             links: vec![LinkCounts::default(); layout.links().len()],
             acyclic: AcyclicCounts::default(),
             live_list: LiveList::new(layout),
+            masters: layout.masters().iter().map(MasterCounts::new).collect(),
         }
     }
 
@@ -211,9 +215,14 @@ impl Counts {
         }
     }
 
-    /// Counts what any station, `observer`, observed.
-    pub(super) fn station(&mut self, observer: Address, what: &Observation) {
+    /// Counts what any station, `observer`, observed at `at`.
+    pub(super) fn station(&mut self, at: Time, observer: Address, what: &Observation) {
         self.live_list.observe(observer, what);
+        if MasterCounts::concerns(what)
+            && let Some(master) = self.masters.iter_mut().find(|master| master.address == observer)
+        {
+            master.observe(at, what);
+        }
         match what {
             Observation::Collision { .. } => self.network.collisions += 1,
             Observation::Disturbed { .. } => self.network.disturbed += 1,
@@ -226,6 +235,7 @@ impl Counts {
     /// The run is over at `end`: closes what is still open.
     pub(super) fn finish(&mut self, end: Time) {
         self.network.duration = end.since_zero();
+        self.masters.iter_mut().for_each(|master| master.finish(end));
         for slave in &mut self.slaves {
             slave.phases[slave.phase as usize] += end - slave.since;
             slave.since = end;

@@ -225,6 +225,8 @@ fn of_rank(recorded: &[(i64, u64)], rank: u64) -> Option<i64> {
 pub enum Source {
     /// One value per cycle.
     Network(fn(&CycleRow) -> Option<Span>),
+    /// One value per cycle, of a network whose masters share the token; a master alone has none.
+    Ring(fn(&CycleRow) -> Option<Span>),
     /// One value per slave and cycle.
     Slave(fn(&SlaveRow) -> Option<Span>),
     /// One value per link and cycle.
@@ -287,6 +289,7 @@ pub const QUANTITIES: &[Quantity] = &[
     Quantity { name: "t_dp_deviation", title: "T_DP deviation", unit: Unit::Ns, signed: true, limit: CYCLE, source: Source::Network(|row| row.t_dp_deviation) },
     Quantity { name: "t_dx", title: "T_DX", unit: Unit::Us, signed: false, limit: CYCLE, source: Source::Network(|row| row.t_dx) },
     Quantity { name: "spare", title: "Spare", unit: Unit::Us, signed: false, limit: CYCLE, source: Source::Network(|row| row.spare) },
+    Quantity { name: "synch_delay", title: "SYNCH delay", unit: Unit::Us, signed: false, limit: CYCLE, source: Source::Ring(|row| row.synch_delay) },
     Quantity { name: "latch_offset", title: "Latch offset", unit: Unit::Ns, signed: true, limit: NEAR, source: Source::Slave(|row| row.latch_offset) },
     Quantity { name: "pll_error", title: "PLL error", unit: Unit::Ns, signed: true, limit: NEAR, source: Source::Slave(|row| row.pll_error) },
     Quantity { name: "wire", title: "Wire latency", unit: Unit::Us, signed: false, limit: CYCLE, source: Source::Link(|row| Some(row.wire)) },
@@ -302,7 +305,8 @@ impl Quantity {
     /// Whose this quantity is in a network of `layout`, in the order of the rows.
     pub fn subjects(&self, layout: &Layout) -> Vec<Subject> {
         match self.source {
-            Source::Network(_) => vec![Subject::Network],
+            Source::Ring(_) if layout.masters().is_empty() => Vec::new(),
+            Source::Network(_) | Source::Ring(_) => vec![Subject::Network],
             Source::Slave(_) => layout.slaves().iter().map(|slave| Subject::Slave(slave.address)).collect(),
             Source::Link(_) => layout.links().iter().map(|&(from, to)| Subject::Link(from, to)).collect(),
         }
@@ -361,7 +365,9 @@ impl Histograms {
             let empty = Histogram::new(quantity.limit, quantity.signed);
             let (name, subjects) = (quantity.name, vec![empty; quantity.subjects(layout).len()]);
             match quantity.source {
-                Source::Network(of) => new.network.push(Recorded { name, of, subjects }),
+                // Without its subject nothing is kept and no row is asked.
+                Source::Ring(_) if subjects.is_empty() => {}
+                Source::Network(of) | Source::Ring(of) => new.network.push(Recorded { name, of, subjects }),
                 Source::Slave(of) => new.slave.push(Recorded { name, of, subjects }),
                 Source::Link(of) => new.link.push(Recorded { name, of, subjects }),
             }
@@ -440,7 +446,8 @@ impl Sink for Histograms {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::layout::SlaveLayout;
+    use crate::observation::MasterClass;
+    use crate::study::layout::{MasterLayout, SlaveLayout};
     use crate::study::sample;
     use proptest::prelude::*;
     use std::collections::BTreeSet;
@@ -554,6 +561,7 @@ mod tests {
             cycle: _,
             t0: _,
             gc_jitter,
+            synch_delay,
             t_dp: _,
             t_dp_deviation,
             t_dx,
@@ -586,6 +594,7 @@ mod tests {
         let LinkRow { cycle: _, publisher: _, subscriber: _, wire, publish, age } = sample::link(1);
         let measured = [
             Some(gc_jitter),
+            synch_delay,
             t_dp_deviation,
             t_dx,
             latch_skew,
@@ -599,7 +608,7 @@ mod tests {
         let recorded: BTreeSet<_> = QUANTITIES
             .iter()
             .map(|quantity| match quantity.source {
-                Source::Network(of) => of(&sample::cycle(1)),
+                Source::Network(of) | Source::Ring(of) => of(&sample::cycle(1)),
                 Source::Slave(of) => of(&sample::slave(1, 3)),
                 Source::Link(of) => of(&sample::link(1)),
             })
@@ -607,6 +616,21 @@ mod tests {
         assert_eq!(recorded, BTreeSet::from(measured), "the sample's spans are all different");
         let names: BTreeSet<_> = QUANTITIES.iter().map(|quantity| quantity.name).collect();
         assert_eq!(names.len(), QUANTITIES.len());
+    }
+
+    #[test]
+    fn a_master_alone_has_no_delay_by_the_token() {
+        let a = |n| Address::new(n).unwrap();
+        let delays = |layout: &Layout| {
+            let mut histograms = Histograms::new(layout);
+            (0..3).for_each(|cycle| histograms.cycle(&sample::cycle(cycle)));
+            histograms.cycle(&CycleRow { synch_delay: None, ..sample::cycle(3) });
+            histograms.get("synch_delay", Subject::Network).map(Histogram::count)
+        };
+        let master = |n| MasterLayout { address: a(n), class: MasterClass::One, slaves: Vec::new() };
+        assert_eq!(delays(&sample::layout()), None);
+        let shared = sample::layout().with_masters(vec![master(1), master(2)]);
+        assert_eq!(delays(&shared), Some(3), "only those that are late");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Layout: which stations a study watches and what their clocks aim at.
 
+use crate::observation::MasterClass;
 use crate::time::Span;
 use crate::wire::Address;
 
@@ -14,6 +15,8 @@ pub struct Layout {
     slaves: Vec<SlaveLayout>,
     /// Slave-to-slave links as (publisher, subscriber), in this order.
     links: Vec<(Address, Address)>,
+    /// All masters, in address order; nobody where there is one only.
+    masters: Vec<MasterLayout>,
     /// Number of a slave by its address, [`Layout::NONE`] where there is none.
     index: [u8; 128],
 }
@@ -29,6 +32,17 @@ pub struct SlaveLayout {
     pub encoder: bool,
 }
 
+/// One master of a [`Layout`] that has several.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct MasterLayout {
+    /// The master.
+    pub address: Address,
+    /// Its class.
+    pub class: MasterClass,
+    /// The slaves in its list, in address order; none of class 2.
+    pub slaves: Vec<Address>,
+}
+
 impl Layout {
     const NONE: u8 = u8::MAX;
 
@@ -42,7 +56,13 @@ impl Layout {
         for (number, slave) in slaves.iter().enumerate() {
             index[usize::from(slave.address.get())] = number as u8;
         }
-        Self { master, t_dp, slaves, links, index }
+        Self { master, t_dp, slaves, links, masters: Vec::new(), index }
+    }
+    /// The same with the masters that share the token, [`Layout::master`] among them; they are brought into address order.
+    #[must_use]
+    pub fn with_masters(self, mut masters: Vec<MasterLayout>) -> Self {
+        masters.sort_by_key(|master| master.address);
+        Self { masters, ..self }
     }
 
     /// The slaves, in address order.
@@ -52,6 +72,10 @@ impl Layout {
     /// The links as (publisher, subscriber), in this order.
     pub fn links(&self) -> &[(Address, Address)] {
         &self.links
+    }
+    /// The masters in address order, where several share the token; nobody where there is one only.
+    pub fn masters(&self) -> &[MasterLayout] {
+        &self.masters
     }
     /// Number of the slave at `address` among [`slaves`](Self::slaves).
     #[inline]

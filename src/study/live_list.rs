@@ -1,7 +1,7 @@
 //! Live list: every station that was seen or looked for, with the counters that a bus analyser shows beside it.
 
 use super::layout::Layout;
-use crate::observation::{GapAnswer, HandlerState, Observation};
+use crate::observation::{AcyclicService, GapAnswer, HandlerState, Observation};
 use crate::time::Span;
 use crate::wire::Address;
 use crate::wire::diag::DiagStatus;
@@ -48,7 +48,7 @@ impl Seen {
     }
 }
 
-/// The counters of one address, as its master counts them: what an analyser beside the master counts on the line.
+/// The counters of one address, as all masters count them: what an analyser beside them counts on the line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Station {
     /// The worst it was seen as; none while nobody saw it or asked for it.
@@ -59,15 +59,17 @@ pub struct Station {
     /// Syncs: how often it was brought into data exchange, the first time included. An analyser counts the start-ups that
     /// end with a Data_Exchange.
     pub syncs: u64,
-    /// Repeats: requests to it that were sent again, in all services (FCB unchanged on the line). An analyser does not see
-    /// a request that a scenario loses before it gets onto the line, and misses its repeat.
+    /// Repeats: requests to it that were sent again, in all services and by all masters (FCB unchanged on the line), and
+    /// tokens to it that were sent again. Of the latter an analyser shows the same token twice, and no other telegram in
+    /// between. It does not see a request that a scenario loses before it gets onto the line, and misses its repeat.
     pub repeats: u64,
-    /// Most repeats in one cycle, from SYNCH to SYNCH.
+    /// Most repeats in one cycle of the master whose figures are taken, from SYNCH to SYNCH.
     pub most_repeats: u64,
-    /// Illegal responses: answers that do not fit their request, RS during the start-up among them. RS to a Data_Exchange
-    /// is how a slave says that it is free, and counts as lost; octets that are no telegram count as a repeat.
+    /// Illegal responses: answers to any master that do not fit their request, RS to a service of DP-V0 among them. RS to
+    /// a Data_Exchange is how a slave says that it is free, and counts as lost; RS in MS1 and MS2 is how it says that the
+    /// SAP is closed; octets that are no telegram count as a repeat.
     pub illegal: u64,
-    /// Diagnoses read: Slave_Diag answered with a diagnosis, whether it said something new or not.
+    /// Diagnoses read: Slave_Diag answered with a diagnosis to any master, whether it said something new or not.
     pub diagnoses: u64,
     /// Number of the cycle that [`Station::here`] is of.
     cycle: u64,
@@ -132,14 +134,17 @@ impl LiveList {
                 station.lost += 1;
                 station.saw(Seen::Master);
             }
-            Observation::Retry { slave } => self.station(slave).repeat(cycle),
+            Observation::Retry { slave: station } | Observation::TokenRetry { to: station } => {
+                self.station(station).repeat(cycle);
+            }
             Observation::IllegalAnswer { slave } => self.station(slave).illegal += 1,
             Observation::Lost { slave } => {
                 let station = self.station(slave);
                 station.lost += 1;
                 station.saw(Seen::Lost);
             }
-            Observation::DiagnosisRead { slave } => {
+            Observation::DiagnosisRead { slave }
+            | Observation::AcyclicData { slave, service: AcyclicService::Diagnosis, .. } => {
                 let station = self.station(slave);
                 station.diagnoses += 1;
                 station.saw(Seen::Present);
@@ -261,6 +266,29 @@ mod tests {
         let list = list(&[cycle(0), retry(3), retry(5), retry(3), cycle(1), retry(3), cycle(2), cycle(3), retry(5)]);
         let of = |number| (list.at(address(number)).repeats, list.at(address(number)).most_repeats);
         assert_eq!((of(3), of(5)), ((3, 2), (2, 1)));
+    }
+
+    #[test]
+    fn every_master_counts() {
+        let (slave, tool, other) = (address(3), address(7), address(9));
+        let mut list = LiveList::new(&sample::layout());
+        let read = |service| Observation::AcyclicData { slave, service, record: None, len: 6, head: [0; 8] };
+        for (by, what) in [
+            (MASTER, Observation::DiagnosisRead { slave }),
+            (7, read(AcyclicService::Diagnosis)),
+            (7, read(AcyclicService::Inputs)),
+            (7, Observation::Retry { slave }),
+            (7, Observation::IllegalAnswer { slave }),
+            (9, Observation::TokenRetry { to: tool }),
+            (9, Observation::CycleStart { cycle: 0, nominal: crate::time::Local::ZERO }),
+            (9, Observation::TokenRetry { to: tool }),
+            (9, Observation::StationLost { station: tool }),
+        ] {
+            list.observe(address(by), &what);
+        }
+        let of = |at: Address| (list.at(at).repeats, list.at(at).illegal, list.at(at).diagnoses, list.at(at).lost);
+        assert_eq!((of(slave), of(tool), of(other)), ((1, 1, 2, 0), (2, 0, 0, 1), (0, 0, 0, 0)));
+        assert_eq!(list.at(tool).most_repeats, 2, "the other master's cycle ends none");
     }
 
     #[test]

@@ -38,6 +38,8 @@ pub struct Metrics<S, V> {
     counts: Counts,
     /// The cycle that is under way; `None` before the first.
     open: Option<CycleRow>,
+    /// How late the SYNCH is that is on its way.
+    delay: Option<Span>,
     /// Where the latches of this cycle belong, per different T_I.
     grid: Vec<Grid>,
     slaves: Vec<Watch>,
@@ -104,7 +106,7 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
         };
         let links = layout.links().iter().map(link).collect();
         let held = Vec::with_capacity(HELD);
-        Self { counts: Counts::new(&layout), open: None, grid, slaves, links, held, layout, shafts, sink }
+        Self { counts: Counts::new(&layout), open: None, delay: None, grid, slaves, links, held, layout, shafts, sink }
     }
 
     /// What was counted until now.
@@ -139,6 +141,7 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
             cycle,
             t0,
             gc_jitter: t0 - crystal.to_true(nominal),
+            synch_delay: self.delay.take(),
             t_dp: before,
             t_dp_deviation: before.map(|t_dp| t_dp - self.layout.t_dp),
             t_dx: None,
@@ -190,6 +193,10 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
         self.counts.master(what, &self.layout);
         if let Observation::CycleStart { cycle, nominal } = *what {
             return self.begin(cycle, stamp.at, nominal, stamp.crystal);
+        }
+        // Told when its sending begins, which is in the cycle before.
+        if let Observation::ClockLate { by } = *what {
+            self.delay = Some(by);
         }
         let Some(open) = &mut self.open else { return };
         match *what {
@@ -266,7 +273,7 @@ impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
         if self.held.first().is_some_and(|event| event.at < stamp.at) {
             self.release();
         }
-        self.counts.station(stamp.station, what);
+        self.counts.station(stamp.at, stamp.station, what);
         if stamp.station == self.layout.master {
             self.master(&stamp, what);
         } else if let Some(index) = self.layout.slave(stamp.station) {

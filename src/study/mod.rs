@@ -10,6 +10,7 @@ pub mod gsd;
 pub mod histogram;
 pub mod layout;
 pub mod live_list;
+pub mod masters;
 pub mod metric;
 pub mod plan;
 pub mod plot;

@@ -2,6 +2,7 @@
 
 use super::acyclic::AcyclicSummary;
 use super::live_list::Seen;
+use super::masters;
 use super::summary::{Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, StationSummary, Summary};
 use crate::observation::Leds;
 use crate::time::Span;
@@ -18,6 +19,7 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     let mut lines = Vec::new();
     network(summary, &mut lines);
     topology(summary, &mut lines);
+    masters(summary, &mut lines);
     slaves(summary, &mut lines);
     leds(summary, &mut lines);
     live_list(summary, &mut lines);
@@ -51,7 +53,12 @@ fn network(summary: &Summary, lines: &mut Vec<String>) {
         range(timing.t_o_min, timing.t_o_max),
         at("from", timing.spare_min),
     ));
+    // The first claim of a run is how the ring begins.
+    let lost_tokens = summary.masters.iter().map(|master| master.tokens_claimed).sum::<u64>().saturating_sub(1);
+    let masters = summary.live_list.iter().filter(|station| station.seen == Seen::Master);
     let happened = [
+        (lost_tokens, "lost token"),
+        (masters.map(|master| master.lost).sum(), "lost master"),
         (counts.faults, "fault"),
         (counts.retries, "retry"),
         (counts.no_answers, "missing answer"),
@@ -66,18 +73,33 @@ fn network(summary: &Summary, lines: &mut Vec<String>) {
     ring(summary, lines);
 }
 
-/// Token rotation and what it did to SYNCH, where the master was not alone.
+/// What the token's rotation did to SYNCH, where the master was not alone.
 fn ring(summary: &Summary, lines: &mut Vec<String>) {
     let Some(ring) = &summary.ring else { return };
-    let late = if ring.late_clocks > 0 {
-        format!("{} late by up to {}", ring.late_clocks, ring.latest)
-    } else {
-        "never late".to_owned()
+    let missed = match ring.missed_clocks {
+        0 => "none missed".to_owned(),
+        missed => format!("{missed} missed, the token was away for whole cycles"),
     };
-    lines.push(format!(
-        "token rotation {} in the mean, {} to {}   SYNCH {late}, {} missed",
-        ring.mean, ring.min, ring.max, ring.missed_clocks
-    ));
+    let delay = summary.distribution("synch_delay").filter(|delay| delay.count > 0);
+    lines.push(match delay {
+        Some(delay) => format!(
+            "SYNCH late in {} of {} cycles: p50 {}, p99 {}, max {}; {missed}",
+            delay.count,
+            summary.network.cycles,
+            span(delay.p50),
+            span(delay.p99),
+            span(delay.max),
+        ),
+        None => format!("SYNCH never late; {missed}"),
+    });
+}
+
+/// Every master that shares the token.
+fn masters(summary: &Summary, lines: &mut Vec<String>) {
+    if !summary.masters.is_empty() {
+        lines.push(String::new());
+        lines.extend(masters::table(&summary.masters));
+    }
 }
 
 /// What is doubtful about the cables, and how they are joined if there is more than one.

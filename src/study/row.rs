@@ -13,6 +13,8 @@ pub struct CycleRow {
     pub t0: Time,
     /// t0 minus the master's jitter-free grid point.
     pub gc_jitter: Span,
+    /// How late the sending of SYNCH began, since the bus was in use; none where it began in time.
+    pub synch_delay: Option<Span>,
     /// Length of the cycle that ended with this t0; none for the first.
     pub t_dp: Option<Span>,
     /// That length minus the nominal T_DP.

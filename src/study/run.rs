@@ -7,7 +7,7 @@ use super::build;
 use super::count::Counts;
 use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
-use super::layout::{Layout, SlaveLayout};
+use super::layout::{Layout, MasterLayout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
 use super::plan::rules;
 use super::plot::{BusCycle, Distribution, Distributions, LinkLatencies, PlotError, PlotMeta, Plots};
@@ -16,6 +16,7 @@ use super::scenario::{Extent, Scenario};
 use super::summary::{Facts, SlaveFacts, Summary};
 use super::topology::Map;
 use crate::device::node::Node;
+use crate::observation::MasterClass;
 use crate::sim::fingerprint::{Digest, Fingerprint, Fingerprints};
 use crate::sim::motion::Shaft;
 use crate::sim::network::{Network, NetworkEvent, Until};
@@ -145,7 +146,7 @@ pub fn run<Q: Queue<NetworkEvent>>(
     let plots = draws.then(|| Plots::new(meta(scenario, &layout)));
     let sinks = Sinks { histograms: Histograms::new(&layout), exports: exports.transpose()?, plots };
     let metrics = Metrics::new(layout, Speeds::of(scenario), sinks);
-    let bus = draws.then(BusCycle::new);
+    let bus = draws.then(|| BusCycle::new(scenario.master.address));
 
     let mut network: Network<Node, Q> = build::network(scenario);
     let mut recorder = (Fingerprints::default(), (metrics, bus));
@@ -193,7 +194,7 @@ fn conclude(
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {
         pictures = stage(dir, plots.pictures(&distributions(&sinks.histograms), bus)?)?;
-        summary.files.extend(Plots::files().map(str::to_owned));
+        summary.files.extend(plots.files().map(str::to_owned));
     }
     if let Some(dir) = &dir {
         pictures.extend(stage(dir, vec![(TOPOLOGY, map.text(true).join("\n") + "\n")])?);
@@ -224,14 +225,30 @@ fn cycles(scenario: &Scenario) -> u64 {
     }
 }
 
-/// The slaves that take part and their links.
+/// The slaves that take part and their links; the masters, where several share the token.
 pub fn layout(scenario: &Scenario) -> Layout {
     let slaves = scenario.configured();
     let slaves = slaves
         .map(|slave| SlaveLayout { address: slave.address, t_i: slave.times.t_i, encoder: !slave.device.subscriber })
         .collect();
     let links = scenario.links.iter().map(|link| (link.publisher, link.subscriber)).collect();
-    Layout::new(scenario.master.address, scenario.master.t_dp, slaves, links)
+    Layout::new(scenario.master.address, scenario.master.t_dp, slaves, links).with_masters(masters(scenario))
+}
+
+/// Nobody where there is one only.
+fn masters(scenario: &Scenario) -> Vec<MasterLayout> {
+    if scenario.class1.is_empty() && scenario.class2.is_empty() {
+        return Vec::new();
+    }
+    let class1 = std::iter::once(scenario.master.address).chain(scenario.class1.iter().map(|class1| class1.address));
+    let class1 = class1.map(|address| MasterLayout {
+        address,
+        class: MasterClass::One,
+        slaves: scenario.slaves_of(address).map(|slave| slave.address).collect(),
+    });
+    let class2 = scenario.class2.iter();
+    let class2 = class2.map(|tool| MasterLayout { address: tool.address, class: MasterClass::Two, slaves: Vec::new() });
+    class1.chain(class2).collect()
 }
 
 fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
@@ -241,6 +258,7 @@ fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
         t_dp: scenario.master.t_dp,
         slaves: layout.slaves().iter().map(|slave| slave.address).collect(),
         links: layout.links().to_vec(),
+        masters: 1 + scenario.class1.len() + scenario.class2.len(),
         duration: scenario.master.t_dp * cycles(scenario) as i64,
         topology: Map::of(scenario),
     }
@@ -273,6 +291,7 @@ fn distributions(histograms: &Histograms) -> Distributions {
     Distributions {
         latch_skew: of("latch_skew", Subject::Network),
         t_dp_deviation: of("t_dp_deviation", Subject::Network),
+        synch_delay: of("synch_delay", Subject::Network),
         links: histograms.layout().links().iter().map(link).collect(),
     }
 }

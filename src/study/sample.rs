@@ -25,6 +25,7 @@ pub(super) fn cycle(cycle: u64) -> CycleRow {
         cycle,
         t0: Time::ZERO + Span::from_ms(cycle as i64),
         gc_jitter: Span::from_ticks(-1),
+        synch_delay: Some(Span::from_us(55)),
         t_dp: Some(Span::from_ms(1) + Span::from_ticks(2)),
         t_dp_deviation: Some(Span::from_ticks(2)),
         t_dx: Some(Span::from_us(449)),

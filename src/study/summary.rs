@@ -8,6 +8,7 @@ use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
 use super::live_list::{Seen, Station};
+use super::masters::MasterSummary;
 use crate::observation::Leds;
 use crate::time::{BitRate, Span};
 use crate::wire::Address;
@@ -30,6 +31,9 @@ pub struct Summary {
     /// The token ring; none where the master was alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ring: Option<Ring>,
+    /// Per master, in address order; nobody where there is one only.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub masters: Vec<MasterSummary>,
     /// Distributions of the network's quantities, by name.
     #[serde(serialize_with = "map")]
     pub distributions: Vec<(&'static str, Distribution)>,
@@ -426,6 +430,7 @@ impl Summary {
             timing: timing(&facts, counts, histograms),
             counts: happened(counts),
             ring: Ring::of(counts),
+            masters: MasterSummary::all(counts, layout),
             distributions: distributions(histograms, Subject::Network),
             slaves: (0..facts.slaves.len()).map(|index| slave(index, &facts, counts, histograms)).collect(),
             links: layout.links().iter().map(link).collect(),

@@ -25,7 +25,7 @@ const NAMES: i32 = LETTERS + 20;
 const LETTERS: i32 = 11;
 
 /// Every kind with its words and colour.
-const KINDS: [(Kind, &str, RGBColor); 8] = [
+const KINDS: [(Kind, &str, RGBColor); 13] = [
     (Kind::Synch, "SYNCH (Global_Control)", VERMILION),
     (Kind::Request, "Data_Exchange request", BLUE),
     (Kind::Reply, "reply", SKY),
@@ -33,6 +33,11 @@ const KINDS: [(Kind, &str, RGBColor); 8] = [
     (Kind::Acyclic, "acyclic", ORANGE),
     (Kind::Gap, "GAP poll and answer", PURPLE),
     (Kind::Token, "token", BLACK),
+    (Kind::OtherRequest, "another master's Data_Exchange request", RGBColor(0x8B, 0x5A, 0x2B)),
+    (Kind::OtherReply, "reply to it", RGBColor(0xD9, 0xBF, 0x9C)),
+    (Kind::OtherAcyclic, "another master's acyclic request", RGBColor(0x9A, 0x8B, 0x00)),
+    (Kind::OtherAnswer, "answer to it", RGBColor(0xF0, 0xE4, 0x42)),
+    (Kind::OtherToken, "another master's token", RGBColor(0xA8, 0xA8, 0xA8)),
     (Kind::Unreadable, "unreadable", GREY),
 ];
 
@@ -140,9 +145,10 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
 pub(super) fn draw_view(meta: &PlotMeta, words: &Words<'_>, view: &View<'_>) -> Result<String, String> {
     let cycle = view.cycle;
     let keys = keys(view);
-    let slaves = meta.slaves.len();
+    let others = others(cycle);
+    let count = others.len() + meta.slaves.len();
     let above = DIMENSIONS as i32 * DIMENSION + NAMES;
-    let lanes_height = Lanes::each(slaves) * slaves as i32;
+    let lanes_height = Lanes::each(count) * count as i32;
     let height = legend_height(&keys, WIDTH - 40) + above + BUS + 12 + lanes_height + Ruler::HEIGHT + 10;
     page(meta, words, height, |canvas, mut area| {
         legend(canvas, &mut area, &keys);
@@ -154,13 +160,24 @@ pub(super) fn draw_view(meta: &PlotMeta, words: &Words<'_>, view: &View<'_>) -> 
         let air = end * 0.005;
         let ruler = Ruler::draw(canvas, plot, Axis::linear("time from t0 [us]", start - air, end + air));
         bus_lane(canvas, view, &ruler, Area { bottom: top + BUS, ..plot });
-        let lanes = Lanes::new(slaves, top + BUS + 12, plot.left, plot.right);
+        let lanes = Lanes::new(count, top + BUS + 12, plot.left, plot.right);
+        for (index, &master) in others.iter().enumerate() {
+            master_lane(canvas, view, &ruler, (&lanes, index), master);
+        }
         for (index, &slave) in meta.slaves.iter().enumerate() {
-            slave_lane(canvas, view, &ruler, (&lanes, index), slave);
+            slave_lane(canvas, view, &ruler, (&lanes, others.len() + index), slave);
         }
         dimensions(canvas, view, &ruler, area.top);
         names(canvas, view, &ruler, top);
     })
+}
+
+/// The other masters that had the token, ascending.
+fn others(cycle: &Cycle) -> Vec<Address> {
+    let mut others: Vec<Address> = cycle.bars.iter().filter_map(|bar| bar.other).collect();
+    others.sort_unstable();
+    others.dedup();
+    others
 }
 
 fn subtitle(view: &View<'_>) -> String {
@@ -220,7 +237,8 @@ fn names(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, bottom: i32) {
     all.push((Kind::Synch, centre(view.next.0, view.next.1), "SYNCH".to_owned()));
     // The next SYNCH of a plan can come before the end of its cycle.
     all.sort_by_key(|entry| entry.1);
-    let (slaves, rare): (Vec<_>, Vec<_>) = all.into_iter().partition(|entry| entry.0 == Kind::Request);
+    let (slaves, rare): (Vec<_>, Vec<_>) =
+        all.into_iter().partition(|entry| matches!(entry.0, Kind::Request | Kind::OtherRequest));
     let width = |name: &str| text_width(name, LETTERS) + 6;
     let wanted: Vec<(i32, i32)> = rare.iter().map(|entry| (entry.1, width(&entry.2))).collect();
     let needed: i32 = wanted.iter().map(|entry| entry.1).sum();
@@ -255,10 +273,23 @@ fn name(bar: &Bar) -> String {
     let slave = bar.slave.map_or_else(String::new, |slave| slave.to_string());
     match bar.kind {
         Kind::Synch => "SYNCH".to_owned(),
-        Kind::Token => "token".to_owned(),
+        Kind::Token | Kind::OtherToken if bar.slave.is_some() => format!("token to {slave}"),
+        Kind::Token | Kind::OtherToken => "token".to_owned(),
         Kind::Gap => format!("GAP {slave}"),
-        Kind::Acyclic => format!("acyclic {slave}").trim_end().to_owned(),
+        Kind::Acyclic | Kind::OtherAcyclic => format!("acyclic {slave}").trim_end().to_owned(),
         Kind::Request | Kind::Reply | Kind::DxbReply | Kind::Unreadable => slave,
+        Kind::OtherRequest | Kind::OtherReply | Kind::OtherAnswer => slave,
+    }
+}
+
+/// What another master sent with the token, and what it was answered.
+fn master_lane(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, lane: (&Lanes, usize), master: Address) {
+    let (lanes, index) = lane;
+    lanes.ground(canvas, index);
+    lanes.name(canvas, index, ruler.area.left, &format!("master {master}"));
+    for bar in view.cycle.bars.iter().filter(|bar| bar.other == Some(master)) {
+        let (left, right) = (ruler.x(view.us(bar.start)), ruler.x(view.us(bar.end)));
+        canvas.fill(Area { left, right, ..lanes.lane(index) }, colour(bar.kind));
     }
 }
 

@@ -39,6 +39,8 @@ pub struct Distributions {
     pub latch_skew: Distribution,
     /// Length of each cycle minus the nominal T_DP (ns).
     pub t_dp_deviation: Distribution,
+    /// How late each late SYNCH was (µs).
+    pub synch_delay: Distribution,
     /// Per link.
     pub links: Vec<LinkLatencies>,
 }

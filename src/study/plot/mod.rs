@@ -20,6 +20,7 @@ pub mod plan;
 mod pll_convergence;
 mod position;
 mod publish_latency;
+mod synch_delay;
 mod t_dp_deviation;
 mod telegrams;
 #[cfg(test)]
@@ -33,20 +34,27 @@ pub use telegrams::BusCycle;
 /// One line of the registry.
 struct Plot {
     file: &'static str,
+    /// Whether a network of this kind has anything to show there.
+    when: fn(&PlotMeta) -> bool,
     draw: fn(&Material<'_>) -> Result<String, String>,
 }
 
 /// Every picture.
 const PLOTS: &[Plot] = &[
-    Plot { file: "latch_skew.svg", draw: latch_skew::draw },
-    Plot { file: "pll_convergence.svg", draw: pll_convergence::draw },
-    Plot { file: "t_dp_deviation.svg", draw: t_dp_deviation::draw },
-    Plot { file: "timeline.svg", draw: timeline::draw },
-    Plot { file: "publish_latency.svg", draw: publish_latency::draw },
-    Plot { file: "bus_cycle.svg", draw: bus_cycle::draw },
-    Plot { file: "position.svg", draw: position::draw },
-    Plot { file: "topology.svg", draw: topology::draw },
+    Plot { file: "latch_skew.svg", when: always, draw: latch_skew::draw },
+    Plot { file: "pll_convergence.svg", when: always, draw: pll_convergence::draw },
+    Plot { file: "t_dp_deviation.svg", when: always, draw: t_dp_deviation::draw },
+    Plot { file: "timeline.svg", when: always, draw: timeline::draw },
+    Plot { file: "publish_latency.svg", when: always, draw: publish_latency::draw },
+    Plot { file: "bus_cycle.svg", when: always, draw: bus_cycle::draw },
+    Plot { file: "position.svg", when: always, draw: position::draw },
+    Plot { file: "topology.svg", when: always, draw: topology::draw },
+    Plot { file: "synch_delay.svg", when: PlotMeta::shares_token, draw: synch_delay::draw },
 ];
+
+const fn always(_: &PlotMeta) -> bool {
+    true
+}
 
 /// What every picture says about the run.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -61,6 +69,8 @@ pub struct PlotMeta {
     pub slaves: Vec<Address>,
     /// The links: publisher, subscriber.
     pub links: Vec<(Address, Address)>,
+    /// Masters that can have the token.
+    pub masters: usize,
     /// Simulated duration.
     pub duration: Span,
     /// The segments with their stations.
@@ -68,6 +78,10 @@ pub struct PlotMeta {
 }
 
 impl PlotMeta {
+    /// Whether SYNCH may have to wait for the token.
+    const fn shares_token(&self) -> bool {
+        self.masters > 1
+    }
     /// Where `address` stands among the slaves.
     fn index(&self, address: Address) -> Option<usize> {
         self.slaves.binary_search(&address).ok()
@@ -103,6 +117,7 @@ pub struct Plots {
     meta: PlotMeta,
     pll: pll_convergence::StartUps,
     deviation: t_dp_deviation::Deviation,
+    delays: synch_delay::Delays,
     timeline: timeline::Timeline,
     position: position::Positions,
 }
@@ -116,6 +131,7 @@ impl Plots {
         Self {
             pll: pll_convergence::StartUps::new(slaves),
             deviation: t_dp_deviation::Deviation::new(),
+            delays: synch_delay::Delays::new(),
             timeline: timeline::Timeline::new(slaves),
             position: position::Positions::new(slaves),
             meta,
@@ -123,8 +139,8 @@ impl Plots {
     }
 
     /// Names of the files that [`Plots::pictures`] draws.
-    pub fn files() -> impl Iterator<Item = &'static str> {
-        PLOTS.iter().map(|plot| plot.file)
+    pub fn files(&self) -> impl Iterator<Item = &'static str> {
+        PLOTS.iter().filter(|plot| (plot.when)(&self.meta)).map(|plot| plot.file)
     }
 
     /// Every picture: name of its file and its text.
@@ -141,13 +157,14 @@ impl Plots {
             Ok(text) => Ok((plot.file, text)),
             Err(reason) => Err(PlotError { file: plot.file, reason }),
         };
-        PLOTS.iter().map(draw).collect()
+        PLOTS.iter().filter(|plot| (plot.when)(&self.meta)).map(draw).collect()
     }
 }
 
 impl Sink for Plots {
     fn cycle(&mut self, row: &CycleRow) {
         self.deviation.cycle(row);
+        self.delays.cycle(row);
     }
     fn slave(&mut self, row: &SlaveRow) {
         if let Some(index) = self.meta.index(row.slave) {

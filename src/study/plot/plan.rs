@@ -51,6 +51,7 @@ fn meta(scenario: &Scenario) -> PlotMeta {
         t_dp,
         slaves: scenario.configured().map(|slave| slave.address).collect(),
         links: scenario.links.iter().map(|link| (link.publisher, link.subscriber)).collect(),
+        masters: 1,
         duration: match scenario.run.duration {
             Extent::Time(span) => span,
             Extent::Cycles(cycles) => t_dp.checked_mul(cycles as i64).unwrap_or(Span::MAX),
@@ -65,7 +66,7 @@ fn cycle(scenario: &Scenario, planned: &Plan, t0: Time) -> Cycle {
     let mut cycle = Cycle::planned(t0, (t0 + t_dp - t_gc, t0 + t_dp));
     let mut bar = |from: Span, to: Span, kind: Kind, slave: Option<Address>| {
         let asks = !matches!(kind, Kind::Reply | Kind::DxbReply);
-        cycle.push(Bar { start: t0 + from, end: t0 + to, kind, asks, slave });
+        cycle.push(Bar { start: t0 + from, end: t0 + to, kind, asks, slave, other: None });
     };
     bar(-t_gc, Span::ZERO, Kind::Synch, None);
     for slot in &planned.slots {

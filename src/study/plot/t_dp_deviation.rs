@@ -3,7 +3,7 @@
 use super::Material;
 use super::buckets::{Buckets, Envelope};
 use super::chart::{Axis, Chart, short};
-use super::distribution::Grid;
+use super::distribution::{Distribution, Grid};
 use super::look::{
     Area, BLUE, Canvas, Font, Key, Swatch, VERMILION, Words, counted as plural, empty_page, legend, page, spread,
 };
@@ -12,7 +12,7 @@ use crate::time::Span;
 
 const COLUMNS: usize = 80;
 /// Room for the labels of the marks [px].
-const LABELS: i32 = 150;
+pub(super) const LABELS: i32 = 150;
 
 /// Smallest and largest deviation over time [ticks].
 #[derive(Clone, Debug)]
@@ -77,17 +77,22 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
         } else {
             chart.band(canvas, &points, cycle * each as f64, BLUE, 0.6);
         }
-        histogram(canvas, Area { left: split, right: area.right - LABELS, ..area }, y, material);
+        let right = Area { left: split, right: area.right - LABELS, ..area };
+        level_histogram(canvas, right, y, (counted, "cycles (logarithmic)", "ns"));
     })
 }
 
-/// Level columns on the same axis, with marks at the right.
-fn histogram(canvas: &mut Canvas<'_>, outer: Area, y: Axis, material: &Material<'_>) {
-    let counted = &material.distributions.t_dp_deviation;
+/// Level columns on the same axis, with marks at the right: what was counted, the name of the other axis, the unit.
+pub(super) fn level_histogram(
+    canvas: &mut Canvas<'_>,
+    outer: Area,
+    y: Axis,
+    (counted, name, unit): (&Distribution, &str, &str),
+) {
     let grid = Grid::over(std::iter::once(counted), COLUMNS);
     let counts = grid.as_ref().map_or_else(Vec::new, |grid| counted.columns(grid));
     let most = counts.iter().copied().fold(0.0, f64::max);
-    let chart = Chart::draw(canvas, outer, Axis::counts("cycles (logarithmic)", most), y);
+    let chart = Chart::draw(canvas, outer, Axis::counts(name, most), y);
     if let Some(grid) = grid {
         for (index, &count) in counts.iter().enumerate().filter(|column| *column.1 > 0.0) {
             let (left, right) = (chart.area.left, chart.x(count).max(chart.area.left + 1));
@@ -103,6 +108,6 @@ fn histogram(canvas: &mut Canvas<'_>, outer: Area, y: Axis, material: &Material<
         let (y, right) = (chart.y(*value), chart.area.right);
         canvas.dashes((chart.area.left, y), (right, y), VERMILION);
         canvas.path(&[(right, y), (right + 18, place)], VERMILION, 1);
-        canvas.text((right + 22, place), &format!("{label} {} ns", short(*value)), Font::new(12).bold());
+        canvas.text((right + 22, place), &format!("{label} {} {unit}", short(*value)), Font::new(12).bold());
     }
 }

@@ -22,7 +22,29 @@ pub(super) enum Kind {
     Acyclic,
     Gap,
     Token,
+    /// Data_Exchange of another master.
+    OtherRequest,
+    OtherReply,
+    /// Anything else of another master but GAP polls: of class 2 its reads, writes and parameters.
+    OtherAcyclic,
+    OtherAnswer,
+    /// The token that another master passes on.
+    OtherToken,
     Unreadable,
+}
+
+impl Kind {
+    /// The same of another master than the one whose cycle it is.
+    const fn of_other(self, asks: bool) -> Self {
+        match self {
+            Self::Request => Self::OtherRequest,
+            Self::Reply | Self::DxbReply => Self::OtherReply,
+            Self::Acyclic | Self::Synch if asks => Self::OtherAcyclic,
+            Self::Acyclic | Self::Synch => Self::OtherAnswer,
+            Self::Token => Self::OtherToken,
+            kind => kind,
+        }
+    }
 }
 
 /// One telegram on the line.
@@ -33,8 +55,10 @@ pub(super) struct Bar {
     pub(super) kind: Kind,
     /// Whether the station that has the token sent it.
     pub(super) asks: bool,
-    /// The slave that it is for or from; the polled address of a GAP poll.
+    /// The slave that it is for or from; the polled address of a GAP poll; who gets a token, unless it stays.
     pub(super) slave: Option<Address>,
+    /// The master that has the token, if it is another one than the one whose cycle it is.
+    pub(super) other: Option<Address>,
 }
 
 /// One bus cycle.
@@ -86,10 +110,11 @@ impl Cycle {
             self.dropped += 1;
         }
     }
-    /// How much there is to see: data exchange first, GAP second.
-    fn rank(&self) -> (bool, bool) {
+    /// How much there is to see: data exchange first, what other masters ask second, GAP third.
+    fn rank(&self) -> (bool, bool, bool) {
         let has = |kind: Kind| self.bars.iter().any(|bar| bar.kind == kind);
-        (has(Kind::Reply) || has(Kind::DxbReply), has(Kind::Gap))
+        let others = has(Kind::OtherRequest) || has(Kind::OtherAcyclic);
+        (has(Kind::Reply) || has(Kind::DxbReply), others, has(Kind::Gap))
     }
     /// T_O of a slave.
     pub(super) fn t_o(&self, slave: Address) -> Option<Time> {
@@ -101,22 +126,27 @@ impl Cycle {
     }
 }
 
-/// Keeps the telegrams, T_O and latch instants of the latest complete cycle with data exchange and a GAP poll, else of
-/// the latest with data exchange, else of the latest.
+/// Keeps the telegrams, T_O and latch instants of the latest complete cycle of one master with data exchange, requests of
+/// other masters and a GAP poll; else of the latest that has most of these, in this order.
 #[derive(Clone, Debug)]
 pub struct BusCycle {
+    /// Whose cycles.
+    master: Address,
     current: Cycle,
     kept: Cycle,
     /// What the last request was for, and for whom.
     asked: (Kind, Option<Address>),
+    /// Who sent the last request or token, if it was another master.
+    other: Option<Address>,
     /// SYNCH, told of ahead of its start: it belongs to the cycle that its last bit begins.
     coming: Option<Bar>,
 }
 
 impl BusCycle {
-    /// Nothing kept yet.
-    pub fn new() -> Self {
-        Self { current: Cycle::new(), kept: Cycle::new(), asked: (Kind::Unreadable, None), coming: None }
+    /// Nothing kept yet of the cycles of `master`.
+    pub fn new(master: Address) -> Self {
+        let asked = (Kind::Unreadable, None);
+        Self { master, current: Cycle::new(), kept: Cycle::new(), asked, other: None, coming: None }
     }
 
     /// The kept cycle.
@@ -140,7 +170,7 @@ impl BusCycle {
     fn classify(&mut self, telegram: &Transmission<'_>) -> (Kind, bool, Option<Address>) {
         match Telegram::parse(telegram.octets) {
             Err(_) => (Kind::Unreadable, false, None),
-            Ok(Telegram::Token { .. }) => (Kind::Token, true, None),
+            Ok(Telegram::Token { da, sa }) => (Kind::Token, true, (da != sa).then_some(da)),
             Ok(Telegram::ShortAck) => (self.asked.0, false, Some(telegram.sender)),
             Ok(Telegram::Data { header, du }) => match header.fc {
                 FrameControl::Response { .. } => (self.answer(&header), false, Some(telegram.sender)),
@@ -167,16 +197,15 @@ fn request(header: &Header, service: Service, du: &[u8]) -> Kind {
     }
 }
 
-impl Default for BusCycle {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Recorder for BusCycle {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
         let (kind, asks, slave) = self.classify(telegram);
-        let bar = Bar { start: telegram.start, end: telegram.end, kind, asks, slave };
+        if asks {
+            self.other = (telegram.sender != self.master).then_some(telegram.sender);
+        }
+        let other = self.other.filter(|_| kind != Kind::Unreadable);
+        let kind = if other.is_some() { kind.of_other(asks) } else { kind };
+        let bar = Bar { start: telegram.start, end: telegram.end, kind, asks, slave, other };
         if kind == Kind::Synch {
             self.coming = Some(bar);
         } else {
@@ -187,7 +216,7 @@ impl Recorder for BusCycle {
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         let station = usize::from(stamp.station.get()).min(STATIONS - 1);
         match what {
-            Observation::CycleStart { cycle, .. } => {
+            Observation::CycleStart { cycle, .. } if stamp.station == self.master => {
                 // Without its SYNCH on the line the cycle begins all the same.
                 let synch = self.coming.take();
                 self.next(synch.map_or(stamp.at, |synch| synch.start), stamp.at);

@@ -65,6 +65,7 @@ struct World {
     now: Time,
     skews: Vec<i64>,
     deviations: Vec<i64>,
+    delays: Vec<i64>,
 }
 
 impl World {
@@ -78,18 +79,20 @@ impl World {
             t_dp,
             slaves,
             links,
+            masters: 2,
             duration: t_dp * cycles as i64,
             topology,
         };
         let mut world = Self {
             plots: Plots::new(meta),
-            bus: BusCycle::new(),
+            bus: BusCycle::new(address(MASTER.into())),
             distributions: Distributions::default(),
             crystal: Crystal::new(0, Local::ZERO).unwrap(),
             noise: 42,
             now: Time::ZERO + Span::from_ms(1),
             skews: Vec::new(),
             deviations: Vec::new(),
+            delays: Vec::new(),
         };
         for cycle in 0..cycles {
             world.cycle(cycle, cycles);
@@ -120,11 +123,14 @@ impl World {
         if cycle > 0 {
             self.deviations.push(deviation / 12);
         }
+        let delay = (cycle % 90 == 89).then(|| (self.noise(20) + 60).max(1));
+        self.delays.extend(delay);
         self.skews.extend(locked.then_some(skew / 12));
         self.plots.cycle(&CycleRow {
             cycle,
             t0,
             gc_jitter: Span::ZERO,
+            synch_delay: delay.map(Span::from_us),
             t_dp: Some(meta.t_dp),
             t_dp_deviation: (cycle > 0).then(|| Span::from_ticks(deviation)),
             t_dx: None,
@@ -248,9 +254,7 @@ impl World {
         self.ask(acyclic, 10);
         self.ask(Header::request(address(126), master, Service::FdlStatus, Fcb::Unused), 0);
         self.now += RATE.span(crate::time::Tbit(300));
-        let mut token = Frame::new();
-        token.set_token(master, master);
-        self.send(MASTER.into(), &token, 0);
+        self.other_master(master);
         for (index, &slave) in slaves.iter().enumerate() {
             let (t_o, t_i) = (t_dp.div_floor(Span::from_us(500)), Span::from_us(125));
             let noise = Span::from_ns(index as i64 * 20);
@@ -263,8 +267,29 @@ impl World {
         self.now = begin + t_dp;
     }
 
+    /// The token goes to another master, which asks a slave of its own and one of these, and comes back.
+    fn other_master(&mut self, master: Address) {
+        let (other, own) = (address(12), self.plots.meta.slaves.first().copied().unwrap_or(master));
+        let mut token = Frame::new();
+        token.set_token(other, master);
+        self.send(MASTER.into(), &token, 37);
+        let exchange = Header::request(address(126), other, Service::SrdHigh, Fcb::First);
+        let read = Header::request(own, other, Service::SrdLow, Fcb::First).with_saps(Sap::MS1, Sap::MASTER_MS2);
+        for header in [exchange, read] {
+            let mut frame = Frame::new();
+            frame.set_data(&header, &[0x55; 4]).unwrap();
+            self.send(12, &frame, 37);
+            self.answer(header.slave_reply(Status::Dl), header.da.get().into(), 6);
+        }
+        // Its cycle is no cycle of the master's.
+        self.saw(self.now, 12, Observation::CycleStart { cycle: 7, nominal: Local::ZERO });
+        token.set_token(master, other);
+        self.send(12, &token, 0);
+    }
+
     fn count(&mut self) {
         self.distributions.latch_skew = counted("latch skew", "ns", &mut self.skews);
+        self.distributions.synch_delay = counted("SYNCH delay", "us", &mut self.delays);
         self.distributions.t_dp_deviation = counted("T_DP deviation", "ns", &mut self.deviations);
         for (index, &(publisher, subscriber)) in self.plots.meta.links.clone().iter().enumerate() {
             let mut spread = |middle: i64, width: i64| {
@@ -393,7 +418,7 @@ fn words(text: &str) -> String {
 }
 
 /// File; words of the title, axes with units, legend.
-const WORDS: [(&str, &[&str]); 8] = [
+const WORDS: [(&str, &[&str]); 9] = [
     ("latch_skew.svg", &["Latch skew:", "latch skew [ns]", "cycles (logarithmic)", "p99.9 ", "cycles per column"]),
     ("pll_convergence.svg", &["PLL convergence:", "error and window [ns]", "cycles since", "± window", "locked at"]),
     ("t_dp_deviation.svg", &["T_DP deviation:", "T_DP deviation [ns]", "time [", "cycles (logarithmic)", "p99 "]),
@@ -402,14 +427,21 @@ const WORDS: [(&str, &[&str]); 8] = [
         &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "telegram disturbed", "slave 3", "LED flashing"],
     ),
     ("publish_latency.svg", &["Publish latency:", "latency [us]", "Wire:", "Publish:", "Age at use:", "p99.9"]),
-    ("bus_cycle.svg", &["Bus cycle:", "time from t0 [us]", "T_DP ", "T_O ", "T_I ", "T_DX ", "spare ", "SYNCH", "DXB"]),
+    (
+        "bus_cycle.svg",
+        &["Bus cycle:", "time from t0 [us]", "T_DP ", "T_O ", "T_I ", "T_DX ", "spare ", "SYNCH", "DXB", "master 12"],
+    ),
     ("position.svg", &["Position:", "G1_XIST1 [steps]", "time ["]),
     ("topology.svg", &["Topology:", "hall 0: 100 m, ", " of 32 loads", "[ns]", "master", "posital-ocd-dpb1b", "17 ns"]),
+    (
+        "synch_delay.svg",
+        &["SYNCH delay:", "SYNCH delay [us]", "time [", "late SYNCH (logarithmic)", "p99 ", "percentiles"],
+    ),
 ];
 
 #[test]
 fn every_picture_says_what_it_shows_with_units_and_legend() {
-    assert!(WORDS.iter().map(|entry| entry.0).eq(Plots::files()));
+    assert!(WORDS.iter().map(|entry| entry.0).eq(PLOTS.iter().map(|plot| plot.file)));
     for (name, world) in worlds() {
         let slaves = world.plots.meta.slaves.len();
         let footer = format!("scenario invented-{slaves}, seed 42, T_DP {}", world.plots.meta.t_dp);
@@ -433,6 +465,15 @@ fn a_picture_without_data_says_why_in_a_sentence() {
         let sentence = words.lines().any(|line| line.ends_with('.') && (line.contains("No") || line.contains("no ")));
         assert!(sentence, "{file}:\n{words}");
     }
+}
+
+#[test]
+fn the_delay_by_the_token_is_drawn_where_there_are_several_masters() {
+    let mut world = World::new(1, 200, Span::from_ms(2));
+    let has = |world: &World| world.pictures().iter().any(|picture| picture.0 == "synch_delay.svg");
+    assert!(has(&world) && world.plots.files().any(|file| file == "synch_delay.svg"));
+    world.plots.meta.masters = 1;
+    assert!(!has(&world) && world.plots.files().all(|file| file != "synch_delay.svg"));
 }
 
 #[test]
@@ -467,6 +508,9 @@ fn the_kept_bus_cycle_has_a_gap_poll_if_one_was_complete() {
     assert!(cycle.bars.iter().any(|bar| bar.kind == telegrams::Kind::Gap));
     assert_eq!(cycle.bars.iter().filter(|bar| bar.kind == telegrams::Kind::Request).count(), 8);
     assert_eq!(cycle.bars.iter().filter(|bar| bar.kind == telegrams::Kind::DxbReply).count(), 1);
+    let of_other: Vec<_> = cycle.bars.iter().filter(|bar| bar.other == Some(address(12))).map(|bar| bar.kind).collect();
+    use telegrams::Kind::{OtherAcyclic, OtherAnswer, OtherReply, OtherRequest, OtherToken};
+    assert_eq!(of_other, [OtherRequest, OtherReply, OtherAcyclic, OtherAnswer, OtherToken]);
 }
 
 #[test]
@@ -476,6 +520,6 @@ fn every_file_of_this_folder_is_registered_or_serves_the_others() {
     let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/study/plot");
     let stem = |path: &Path| path.file_stem().unwrap().to_string_lossy().into_owned();
     let files: BTreeSet<String> = std::fs::read_dir(dir).unwrap().map(|entry| stem(&entry.unwrap().path())).collect();
-    let known = Plots::files().map(|file| stem(Path::new(file))).chain(SERVING.map(str::to_owned));
+    let known = PLOTS.iter().map(|plot| stem(Path::new(plot.file))).chain(SERVING.map(str::to_owned));
     assert_eq!(files, known.collect());
 }

@@ -183,10 +183,17 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
     let (cycles, slaves) = (timeline.cycles, meta.slaves.len());
     let zoomed = cycles > START * 2;
     let split = if zoomed { format!("Left: the first {START} cycles; right: the whole run. ") } else { String::new() };
+    // A master without supply begins no cycle.
+    let gone = meta.duration - meta.t_dp * cycles as i64;
+    let gone = if gone > meta.t_dp * 10 {
+        format!("Time is cycles begun x T_DP: {gone} of the run had no cycle and take no room. ")
+    } else {
+        String::new()
+    };
     let words = Words {
         title: "Timeline: start-up phases, faults, LEDs and disturbances of every slave",
         subtitle: format!(
-            "{}, {}. {split}Each piece of time shows its lowest phase and, in the two strips below, the first pattern of \
+            "{}, {}. {split}{gone}Each piece of time shows its lowest phase and, in the two strips below, the first pattern of \
              the manual's table that the red and the green LED showed; a mark is at least {MARK} pixels wide, and \
              marks that meet stand side by side. Numbers at the right: totals of the run.",
             counted(slaves as u64, "slave"),
