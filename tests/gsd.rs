@@ -70,6 +70,12 @@ fn assert_same(read: &Profile, known: &Profile) {
         max_diag,
         min_slave_interval,
         acyclic,
+        c1,
+        c2,
+        ms2_connections,
+        wd_base_1ms,
+        isochronous,
+        isochronous_required,
         source,
     } = read;
     assert_eq!((name, title, ident, config), (&known.name, &known.title, &known.ident, &known.config));
@@ -82,6 +88,9 @@ fn assert_same(read: &Profile, known: &Profile) {
     assert_eq!((steps_per_rev, revolutions), (&known.steps_per_rev, &known.revolutions));
     assert_eq!((publisher, subscriber, dxb), (&known.publisher, &known.subscriber, &known.dxb));
     assert_eq!((max_prm, fail_safe, acyclic), (&known.max_prm, &known.fail_safe, &known.acyclic));
+    assert_eq!((c1, c2, ms2_connections), (&known.c1, &known.c2, &known.ms2_connections));
+    assert_eq!((wd_base_1ms, isochronous), (&known.wd_base_1ms, &known.isochronous));
+    assert_eq!(isochronous_required, &known.isochronous_required);
     assert!(source.contains("test.gsd"), "where it comes from is its own: {source}");
 }
 
@@ -467,6 +476,26 @@ fn the_program_shows_a_file_and_refuses_a_broken_one() {
     let (code, page, _) = call(&["gsd", "good.gsd"]);
     assert_eq!(code, Some(0));
     assert!(page.contains("can be simulated as an encoder: device = { gsd = \"good.gsd\" }"), "{page}");
+    // Inconsistent, but readable; what is merely missing or another device's is no fault of the file.
+    for (from, to, expected) in [
+        ("TDP_MIN                  = 4", "TDP_MIN = 3", 1),
+        ("T_PLL_W_MAX              = 240", "T_PLL_W_MAX = 0", 1),
+        ("Max_Input_Len            = 12", "Max_Input_Len = 11", 1),
+        ("C1_Max_Data_Len          = 240", "C1_Max_Data_Len = 241", 1),
+        ("C2_Max_Count_Channels    = 2", "C2_Max_Count_Channels = 50", 1),
+        ("T_PLL_W_MAX              = 240", "", 0),
+        ("C1_Response_Timeout      = 1000", "", 0),
+        ("Station_Type             = 0", "Station_Type = 1", 0),
+    ] {
+        room.write("other.gsd", with(from, to));
+        let (code, page, error) = call(&["gsd", "other.gsd"]);
+        assert_eq!((code, error.as_str()), (Some(expected), ""), "{to}: {page}");
+        let word = if expected == 1 { "error" } else { "note" };
+        assert!(page.contains("does not fit") || page.contains(" what"), "{page}");
+        assert!(page.lines().any(|line| line.split_whitespace().nth(1) == Some(word)), "{page}");
+    }
+    let (_, help, _) = call(&["gsd", "--help"]);
+    assert!(help.contains("1 it is inconsistent"), "{help}");
     let (code, page, error) = call(&["gsd", "bad.gsg"]);
     assert_eq!((code, page.as_str()), (Some(2), ""));
     assert!(

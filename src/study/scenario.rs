@@ -322,8 +322,9 @@ pub struct Master {
     pub life_delay: u32,
     /// Whether further tokens to itself fill the spare time (Model: D6).
     pub active_spare: bool,
-    /// C1_Response_Timeout, after which an acyclic request over MS1 is given up; a multiple of 10 ms (GSD).
-    pub ms1_timeout: Span,
+    /// When an acyclic request over MS1 is given up, a multiple of 10 ms, also by further masters; none is each slave's
+    /// C1_Response_Timeout (GSD).
+    pub ms1_timeout: Option<Span>,
     /// How it watches and tells its slaves.
     pub services: MasterServices,
 }
@@ -624,7 +625,7 @@ pub(crate) mod tests {
                 life_start: 1,
                 life_delay: 0,
                 active_spare: false,
-                ms1_timeout: Span::from_s(10),
+                ms1_timeout: None,
                 services: MasterServices::default(),
             },
             class1: Vec::new(),

@@ -47,8 +47,9 @@ impl Gsd {
         let line = |line: Option<usize>| line.map_or_else(|| "-".to_owned(), |line| line.to_string());
         let count = found.len();
         let shown = found.into_iter().take(ROWS);
-        let rows: Vec<_> = shown.map(|finding| vec![line(finding.line), finding.message]).collect();
-        lines.extend(aligned(&["line", "what"], &[1], &rows));
+        let rows: Vec<_> =
+            shown.map(|finding| vec![line(finding.line), finding.weight.text().to_owned(), finding.message]).collect();
+        lines.extend(aligned(&["line", "", "what"], &[1, 2], &rows));
         more(count, lines);
     }
     fn verdict(&self, lines: &mut Vec<String>) {

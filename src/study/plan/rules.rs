@@ -100,6 +100,9 @@ pub static SERVICES: &[Rule] = &[
         .or(&["master.t_dp"]),
     Rule::must("Data_Control_Time >= 6 x T_DP", "Model: D5", services::data_control_time),
 ];
+/// Acyclic services.
+pub static ACYCLIC: &[Rule] =
+    &[Rule::warning("octets of a record <= C1_Max_Data_Len, C2_Max_Data_Len", "GSD", services::acyclic_lengths)];
 /// T_I, T_O and the window of every slave.
 pub static INSTANTS: &[Rule] = &[
     Rule::must("T_I = n x T_BASE_IO", "manual 3.3.4, 3.3.5", instants::t_i_grid).clocked(),
@@ -134,7 +137,7 @@ pub static ADVICE: &[Rule] = &[
 ];
 
 /// Every rule.
-pub static ALL: &[&[Rule]] = &[BUS, CYCLE, SERVICES, INSTANTS, TIMERS, JITTER, START_UP, ADVICE];
+pub static ALL: &[&[Rule]] = &[BUS, CYCLE, SERVICES, INSTANTS, TIMERS, JITTER, START_UP, ACYCLIC, ADVICE];
 
 /// What the rules look at.
 #[derive(Clone, Debug)]

@@ -260,7 +260,8 @@ fn entry<'t>(root: &'t mut Table, name: &str, index: &str) -> Option<&'t mut Tab
 /// Keys of which one takes the other's place when it is overridden.
 const INSTEAD: [(&str, &str); 3] = [("duration", "cycles"), ("at", "cycle"), ("slave", "slaves")];
 
-/// Puts `node` at `path` under `table`; what is not a table on the way becomes one.
+/// Puts `node` at `path` under `table`; what is neither table nor list on the way becomes a table. Entries of lists are
+/// counted from 1.
 fn put(table: &mut Table, path: &[&str], node: &Node) -> Result<(), Fault> {
     match path {
         [] | [""] => Err(Fault::new("an override names a key").help("for example slave.3.crystal=20 ppm")),
@@ -276,12 +277,37 @@ fn put(table: &mut Table, path: &[&str], node: &Node) -> Result<(), Fault> {
         [key, rest @ ..] => {
             let empty = || Node { place: node.place, value: Value::Table(Table::default()) };
             let (_, inner) = table.0.entry((*key).to_owned()).or_insert_with(|| (node.place, empty()));
-            if !matches!(inner.value, Value::Table(_)) {
+            if !matches!(inner.value, Value::Table(_) | Value::List(_)) {
                 *inner = empty();
             }
-            let Value::Table(inner) = &mut inner.value else { return Ok(()) };
-            put(inner, rest, node)
+            match &mut inner.value {
+                Value::Table(inner) => put(inner, rest, node),
+                Value::List(items) => put_in_list(key, items, rest, node),
+                _ => Ok(()),
+            }
         }
+    }
+}
+/// Puts `node` at `path`, which begins with a number, into the list `key`.
+fn put_in_list(key: &str, items: &mut [Node], path: &[&str], node: &Node) -> Result<(), Fault> {
+    let [index, rest @ ..] = path else { return Ok(()) };
+    let help = match items.len() {
+        0 => "the list is empty".to_owned(),
+        1 => format!("it has one: {key}.1"),
+        count => format!("it has {key}.1 to {key}.{count}"),
+    };
+    let number = index.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+    let Some(item) = number.and_then(|number| items.get_mut(number)) else {
+        return Err(Fault::new(format!("the list {key} has no number \"{index}\"")).help(help));
+    };
+    match (&mut item.value, rest) {
+        (Value::Table(table), rest) => put(table, rest, node),
+        (Value::List(items), [_, ..]) => put_in_list(index, items, rest, node),
+        (_, []) => {
+            *item = node.clone();
+            Ok(())
+        }
+        (_, [key, ..]) => Err(Fault::new(format!("entry {index} of the list has no keys, and so no \"{key}\""))),
     }
 }
 
@@ -364,7 +390,7 @@ fn master(
     let life_start = s.optional(reader, "life_start", number(1..=15)).unwrap_or(1);
     let life_delay = s.optional(reader, "life_delay", number(0..=u32::MAX)).unwrap_or(0);
     let active_spare = s.optional(reader, "active_spare", yes).unwrap_or(false);
-    let ms1_timeout = s.optional(reader, "ms1_timeout", acyclic::timeout).unwrap_or(acyclic::RESPONSE_TIMEOUT);
+    let ms1_timeout = s.optional(reader, "ms1_timeout", acyclic::timeout);
     let services = services::master(s, reader);
     section.finish(reader);
     let (address, t_dp) = (address?, t_dp?);
