@@ -61,6 +61,7 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
         group: if clocked { CLOCK_GROUP } else { 0 } | services.groups,
         dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::PRM_STRUCTURE)
             .with(DpV1Status::ISOM_REQ, clocked)
+            .with(DpV1Status::WD_BASE_1MS, watchdog.is_some_and(|watchdog| watchdog.base_1ms))
             .with(DpV1Status::FAIL_SAFE, slave.device.fail_safe)
             .with(DpV1Status::PUBLISHER_ENABLE, publisher)
             | preset_status(slave),

@@ -76,18 +76,22 @@ impl File {
     pub(super) fn line(&self, keyword: &str) -> Option<usize> {
         self.values.get(keyword).map(|(_, at)| at.line)
     }
+    /// The number that a keyword of isochronous mode has; without that mode it says nothing.
+    fn isochronous(&self, keyword: &str) -> Option<u32> {
+        self.number(keyword).filter(|_| self.flag("Isochron_Mode_supp"))
+    }
     /// T_BASE_DP (1/12 us). 1500 is the one that every slave knows.
     fn t_base_dp(&self) -> u32 {
-        self.number("TBASE_DP").unwrap_or(1_500)
+        self.isochronous("TBASE_DP").unwrap_or(1_500)
     }
     /// T_BASE_IO (1/12 us).
     fn t_base_io(&self) -> u32 {
-        self.number("TBASE_IO").unwrap_or(1_500)
+        self.isochronous("TBASE_IO").unwrap_or(1_500)
     }
     /// The shortest and the longest T_DP (1/12 us).
     fn t_dp(&self) -> (u64, u64) {
         let units = |keyword, usual| {
-            self.number(keyword).map_or(usual, |number| u64::from(number) * u64::from(self.t_base_dp()))
+            self.isochronous(keyword).map_or(usual, |number| u64::from(number) * u64::from(self.t_base_dp()))
         };
         (units("TDP_MIN", *IsoM::T_DP_RANGE.start()), units("TDP_MAX", *IsoM::T_DP_RANGE.end()))
     }
@@ -208,7 +212,8 @@ pub(super) fn profile(file: &File, module_name: Option<&str>) -> Result<Profile,
 /// The profile with a module that was found good.
 fn of_module(file: &File, config: &[u8], subscriber: bool) -> Profile {
     let iso_units = |keyword, usual: u32| file.number(keyword).unwrap_or(usual);
-    let io = |keyword| Span::from_iso_units(iso_units(keyword, 1).max(1).saturating_mul(file.t_base_io()));
+    let io =
+        |keyword| Span::from_iso_units(file.isochronous(keyword).unwrap_or(1).max(1).saturating_mul(file.t_base_io()));
     let (t_dp_min, t_dp_max) = file.t_dp();
     let t_dp =
         |units: u64| Span::from_iso_units(units.clamp(*IsoM::T_DP_RANGE.start(), *IsoM::T_DP_RANGE.end()) as u32);
@@ -241,7 +246,7 @@ fn of_module(file: &File, config: &[u8], subscriber: bool) -> Profile {
         t_o_min: io("TO_MIN"),
         gap_min: GAP_MIN,
         functions_min: FUNCTIONS_MIN.max(io("TI_MIN")),
-        t_pll_w_max: iso_units("T_PLL_W_MAX", 12) as u16,
+        t_pll_w_max: file.isochronous("T_PLL_W_MAX").unwrap_or(12) as u16,
         min_window: MIN_WINDOW,
         steps_per_rev: DISC.steps_per_rev,
         revolutions: DISC.revolutions,
@@ -350,8 +355,11 @@ impl Findings<'_> {
     fn isochronous(&mut self) {
         let file = self.file;
         if !file.flag("Isochron_Mode_supp") {
-            return self
-                .refuse("Isochron_Mode_supp", "the device has no isochronous mode (Isochron_Mode_supp)".to_owned());
+            if file.flag("Isochron_Mode_required") {
+                let message = "Isochron_Mode_required without Isochron_Mode_supp".to_owned();
+                self.refuse("Isochron_Mode_required", message);
+            }
+            return;
         }
         for keyword in ["DPV1_Slave", "Prm_Block_Structure_supp"] {
             if !file.flag(keyword) {
@@ -405,7 +413,8 @@ impl Findings<'_> {
 
     fn rates(&mut self) {
         let file = self.file;
-        if !BitRate::ALL.iter().any(|&rate| rate >= BitRate::M1_5 && file.works_at(rate)) {
+        let isochronous = file.flag("Isochron_Mode_supp");
+        if isochronous && !BitRate::ALL.iter().any(|&rate| rate >= BitRate::M1_5 && file.works_at(rate)) {
             self.unknown("1.5M_supp", "no bit rate from 1.5 Mbit/s on, where isochronous mode begins".to_owned());
         }
         for &rate in BitRate::ALL {

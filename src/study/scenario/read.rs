@@ -376,7 +376,7 @@ fn master(
     };
     let t_mapc = s.optional(reader, "t_mapc", number(0..=u8::MAX)).unwrap_or(1);
     let times = Times::read(reader, s, rate);
-    let watchdog = s.optional(reader, "watchdog", watchdog).unwrap_or(Some(Watchdog { factor_1: 20, factor_2: 1 }));
+    let watchdog = s.optional(reader, "watchdog", watchdog).unwrap_or(Some(Watchdog::USUAL));
     let get_cfg = s.optional(reader, "get_cfg", yes).unwrap_or(true);
     let dx_retries = s.optional(reader, "dx_retries", number(0..=15)).unwrap_or(1);
     let lost_after = s.optional(reader, "lost_after", number(1..=u32::from(u16::MAX))).unwrap_or(10);
@@ -454,13 +454,18 @@ pub(super) fn watchdog(node: &Node) -> Result<Option<Watchdog>, Fault> {
         return Ok(None);
     }
     Watchdog::of(wanted).map(Some).ok_or_else(|| {
-        let steps = wanted.div_floor(Watchdog::BASE).clamp(0, 255 * 255);
-        let of = |steps: i64| Watchdog::of(Watchdog::BASE * steps).map(|watchdog| format!("\"{}\"", watchdog.span()));
+        let fine = !wanted.is_multiple_of(Watchdog::BASE) && wanted < Watchdog::BASE_1MS * (255 * 255);
+        let step = if fine { Watchdog::BASE_1MS } else { Watchdog::BASE };
+        let steps = wanted.div_floor(step).clamp(0, 255 * 255);
+        let of = |steps: i64| Watchdog::of(step * steps).map(|watchdog| format!("\"{}\"", watchdog.span()));
         let below = (0..=steps).rev().find_map(of);
         let above = (steps + 1..=255 * 255).find_map(of);
         let nearest: Vec<_> = below.into_iter().chain(above).collect();
         Fault::new(format!("no watchdog runs for {wanted}"))
-            .rule("a watchdog is 10 ms x WD_Fact_1 x WD_Fact_2 with factors from 1 to 255 (Set_Prm octets 2 and 3)")
+            .rule(
+                "a watchdog is 10 ms x WD_Fact_1 x WD_Fact_2 with factors from 1 to 255 (Set_Prm octets 2 and 3), or 1 ms x \
+                 both with WD_Base_1ms_supp (octet 8)",
+            )
             .help(format!("the nearest are {}, and \"0 ms\" is off", nearest.join(" and ")))
     })
 }
@@ -504,8 +509,11 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let own = Times::read(reader, s, rate);
     let master = s.optional(reader, "master", address).or(context.master.map(|master| master.address));
     let clocked = context.master.is_none_or(|own| own.pace == Pace::Synch && master == Some(own.address));
+    let isochronous = kind.as_ref().is_none_or(|kind| kind.device.isochronous);
     if !clocked {
         class1::refuse_times(s, reader);
+    } else if !isochronous {
+        class1::refuse_times_of_device(s, reader);
     }
     let standstill = Motion::Standstill { at: Angle::ZERO };
     let motion = match s.table(reader, "motion") {
@@ -524,7 +532,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let user_prm = gsd::user_prm(kind.as_ref(), s, reader);
     let services = services::slave(s, reader);
     section.finish(reader);
-    let times = if clocked {
+    let times = if clocked && isochronous {
         iso_times(reader, from, own.or(context.times), context.times.is_some())
     } else {
         Some(class1::UNCLOCKED)
