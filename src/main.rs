@@ -18,7 +18,7 @@ use isodp::study::scenario::{Extent, Scenario};
 use isodp::study::{devices, report};
 use isodp::time::Span;
 
-/// A planned network breaks a rule.
+/// A planned network breaks a rule, or a GSD file is inconsistent.
 const VIOLATED: u8 = 1;
 /// A wrong call, scenario or file.
 const USAGE: u8 = 2;
@@ -40,7 +40,10 @@ Examples:
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
 
-Exit codes: 0 done, 1 a planned rule is violated, 2 wrong usage, scenario or file.";
+Exit codes: 0 done, 1 a planned rule is violated or a GSD file is inconsistent, 2 wrong usage, scenario or file.";
+
+const GSD_CODES: &str = "\
+Exit codes: 0 the file fits together (notes are no fault), 1 it is inconsistent: one of the findings is an error, 2 it cannot be read.";
 
 /// Simulates isochronous PROFIBUS DP (DP-V2) networks, telegram by telegram, in deterministic time.
 #[derive(Parser)]
@@ -64,6 +67,7 @@ enum Command {
     /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
     /// Shows what a GSD file says, what of it is ignored and what does not fit.
+    #[command(after_help = GSD_CODES)]
     Gsd(GsdArgs),
 }
 
@@ -152,7 +156,7 @@ fn main() -> ExitCode {
         Command::Plan(args) => plan_command(args),
         Command::Replay(args) => replay_command(args).map(done),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
-        Command::Gsd(args) => gsd_command(&args.file).map(done),
+        Command::Gsd(args) => gsd_command(&args.file),
     };
     match result.and_then(|(page, code)| show(&page).map(|()| code)) {
         Ok(code) => code,
@@ -214,8 +218,10 @@ fn with_seed(mut sets: Vec<(String, String)>, seed: Option<u64>) -> Vec<(String,
     sets
 }
 
-fn gsd_command(file: &Path) -> Result<String, Box<dyn std::error::Error>> {
-    Ok(Gsd::load(file)?.to_string())
+fn gsd_command(file: &Path) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
+    let gsd = Gsd::load(file)?;
+    let code = if gsd.is_inconsistent() { ExitCode::from(VIOLATED) } else { ExitCode::SUCCESS };
+    Ok((gsd.to_string(), code))
 }
 
 /// The progress bar; nothing where standard error is no terminal.

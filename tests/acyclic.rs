@@ -107,6 +107,132 @@ fn ms1_gives_a_slave_without_supply_up_after_c1_response_timeout() {
     assert_eq!(failures(&run, 2), [(4, AcyclicFailure::Left)], "it left data exchange before");
 }
 
+/// A GSD file of an encoder with other acyclic services, and a scenario beside it with `more`.
+fn from_gsd(changes: &[(&str, &str)], more: &str) -> (crate::cli::Room, Result<Scenario, String>) {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/gsd/isodp_posital_06df.gsd");
+    let mut gsd = std::fs::read_to_string(path).expect("a shipped file");
+    for (keyword, value) in changes {
+        let line = gsd.lines().find(|line| line.starts_with(keyword)).expect("a keyword").to_owned();
+        gsd = gsd.replace(&line, &format!("{keyword} = {value}"));
+    }
+    let room = crate::cli::Room::new();
+    room.write("encoder.gsd", gsd);
+    let three = THREE.replace("\"posital-ocd-dpb1b\"", "{ gsd = \"encoder.gsd\" }");
+    room.write("net.toml", format!("{three}\n[run]\nduration = \"900 ms\"\n{more}"));
+    let scenario = Scenario::load(&room.path("net.toml"), &[]).map_err(|error| error.to_string());
+    (room, scenario)
+}
+/// How long services of this class took that ended without an answer.
+fn timed_out(run: &Run, station: u8) -> Vec<Span> {
+    let took = |what: &Observation| match *what {
+        Observation::AcyclicDone { result: AcyclicResult::Timeout, took, .. } => Some(took),
+        _ => None,
+    };
+    seen(run, station, took).into_iter().map(|(_, took)| took).collect()
+}
+
+#[test]
+fn each_slave_has_the_response_timeouts_of_its_gsd_file() {
+    let off = "[[event]]\ncycle = 300\ndo = \"power-off\"\nslave = 4\n";
+    let tool = "[[class2]]\naddress = 1\n[[class2.job]]\nservice = \"parameter-read\"\nparameter = 918\nslave = 4\n\
+                start = \"400 ms\"\n";
+    let more = [off, &read(301, "slave = 4"), tool].concat();
+    let times = [("C1_Response_Timeout", "12"), ("C2_Response_Timeout", "7")];
+    let patient = |scenario: Result<Scenario, String>, sets: Option<Span>| {
+        let mut scenario = scenario.unwrap_or_else(|error| panic!("{error}"));
+        scenario.master.lost_after = 10_000;
+        scenario.master.ms1_timeout = sets;
+        Run::of(&scenario)
+    };
+    let about = |took: &[Span], ms| took.len() == 1 && took[0] > Span::from_ms(ms) && took[0] < Span::from_ms(ms + 3);
+    let (_room, scenario) = from_gsd(&times, &more);
+    let run = patient(scenario.clone(), None);
+    assert!(about(&timed_out(&run, 2), 120), "{:?}", timed_out(&run, 2));
+    assert!(about(&timed_out(&run, 1), 70), "{:?}", timed_out(&run, 1));
+    let run = patient(scenario.clone(), Some(Span::from_ms(50)));
+    assert!(about(&timed_out(&run, 2), 50), "[master] ms1_timeout is for all");
+    // A slave with another GSD file has another time.
+    let (_room, mut scenario) = (0, scenario.expect("good"));
+    scenario.slaves[1].device = isodp::device::profile::find("posital-ocd-dpb1b").expect("built in").into();
+    assert_eq!(timed_out(&patient(Ok(scenario), None), 2), [], "10 s are not over");
+}
+
+#[test]
+fn records_beyond_the_length_of_the_gsd_file_are_refused_and_warned_of() {
+    let tool = "[[class2]]\naddress = 1\n[[class2.job]]\nservice = \"parameter-read\"\nparameter = 979\nelements = 11\n\
+                slave = 5\nstart = \"300 ms\"\n[[class2.job]]\nservice = \"record-write\"\nindex = 47\nlength = 41\ndata = [1]\n\
+                slave = 3\nstart = \"300 ms\"\n";
+    let more = [&read(300, "slave = 3").replace("918", "979").replace("elements = 0", "elements = 11"), tool].concat();
+    for (octets, refused) in [("50", 0), ("49", 1), ("40", 1)] {
+        let lengths = [("C1_Max_Data_Len", octets), ("C2_Max_Data_Len", octets)];
+        let (_room, scenario) = from_gsd(&lengths, &more);
+        let scenario = scenario.unwrap_or_else(|error| panic!("{error}"));
+        let warned = isodp::study::plan::rules::warnings(&scenario).join("\n");
+        let run = Run::of(&scenario);
+        let constraint = AcyclicFailure::Refused(ErrorCode::READ_CONSTRAINT);
+        assert_eq!(failures(&run, 2), vec![(3, constraint); refused], "{octets}");
+        let of_tool =
+            |why| failures(&run, 1).iter().filter(|failure| failure.1 == AcyclicFailure::Refused(why)).count();
+        assert_eq!(of_tool(ErrorCode::READ_CONSTRAINT), refused, "{octets}: {:?}", failures(&run, 1));
+        assert_eq!(of_tool(ErrorCode::WRITE_LENGTH), usize::from(octets == "40"), "{octets}: {:?}", failures(&run, 1));
+        assert_eq!(warned.contains("octets (GSD: C1_Max_Data_Len)"), refused == 1, "{warned}");
+        assert_eq!(
+            warned.contains("slave 5 refuses an acyclic request or answer of 50 octets"),
+            refused == 1,
+            "{warned}"
+        );
+        assert_eq!(
+            warned.contains("slave 3 refuses an acyclic request or answer of 41 octets"),
+            octets == "40",
+            "{warned}"
+        );
+        // The Initiate response says it too: octet 2.
+        let told = run.telegrams.iter().any(|(.., octets)| {
+            matches!(Telegram::parse(octets), Ok(Telegram::Data { du: [0x57, max, ..], header }) if header.sa == address(5) && max.to_string() == lengths[1].1)
+        });
+        assert!(told, "{octets}");
+    }
+}
+
+#[test]
+fn a_gsd_file_has_the_number_of_ms2_connections() {
+    let more = [reader(1, 3, 300), reader(7, 3, 320)].concat();
+    let (_room, scenario) = from_gsd(&[("C2_Max_Count_Channels", "1")], &more);
+    let run = Run::of(&scenario.unwrap_or_else(|error| panic!("{error}")));
+    assert_eq!((connections(&run, 1), values(&run, 7)), (OPENED.to_vec(), vec![]));
+    let (_room, scenario) = from_gsd(&[("C2_Read_Write_supp", "0")], &more);
+    let error = scenario.expect_err("no MS2");
+    assert!(error.contains("class2.1.job.1.slave: slave 3 takes no acyclic requests of class 2 masters"), "{error}");
+    let diagnosis = more.replace("service = \"parameter-read\"\nparameter = 918", "service = \"diagnosis\"");
+    assert!(from_gsd(&[("C2_Read_Write_supp", "0")], &diagnosis).1.is_ok(), "DP-V0 is for all");
+}
+
+#[test]
+fn a_class_2_master_loses_its_supply_and_comes_back() {
+    let off = "[[event]]\nat = \"500 ms\"\ndo = \"power-off\"\nstation = 1\n";
+    let on = "[[event]]\nat = \"900 ms\"\ndo = \"power-on\"\nstation = 1\n";
+    let run = Run::of(&network(4_000, &[&reader(1, 4, 300), off, on].concat(), &[]));
+    let (gone, back) = (Time::ZERO + Span::from_ms(500), Time::ZERO + Span::from_ms(900));
+    let sent = |from: Time, to: Time| {
+        run.telegrams.iter().filter(|(at, _, who, _)| *who == address(1) && *at > from && *at < to).count()
+    };
+    let end = Time::ZERO + Span::from_s(4);
+    assert!(sent(Time::ZERO, gone) > 20 && sent(gone + Span::from_ms(1), back) == 0 && sent(back, end) > 100);
+    let read = |what: &Observation| matches!(what, Observation::ParameterValue { .. }).then_some(());
+    let times: Vec<_> = seen(&run, 1, read).into_iter().map(|(at, ())| at).collect();
+    assert!(
+        times.iter().any(|at| *at < gone) && times.iter().filter(|at| **at > back + Span::from_ms(300)).count() > 5
+    );
+    assert_eq!(late(&run).len(), 0, "nobody else notices");
+    let error = Scenario::parse(
+        "x",
+        "x.toml",
+        &format!("{THREE}\n[run]\ncycles = 900\n{}", off.replace("= 1\n", "= 9\n")),
+        &[],
+    );
+    assert!(error.expect_err("no station 9").to_string().contains("there is no station 9"));
+}
+
 #[test]
 fn ms1_is_closed_outside_of_data_exchange() {
     // Slave 5 is the last to be parameterised.

@@ -70,6 +70,12 @@ fn assert_same(read: &Profile, known: &Profile) {
         max_diag,
         min_slave_interval,
         acyclic,
+        c1,
+        c2,
+        ms2_connections,
+        wd_base_1ms,
+        isochronous,
+        isochronous_required,
         source,
     } = read;
     assert_eq!((name, title, ident, config), (&known.name, &known.title, &known.ident, &known.config));
@@ -82,6 +88,9 @@ fn assert_same(read: &Profile, known: &Profile) {
     assert_eq!((steps_per_rev, revolutions), (&known.steps_per_rev, &known.revolutions));
     assert_eq!((publisher, subscriber, dxb), (&known.publisher, &known.subscriber, &known.dxb));
     assert_eq!((max_prm, fail_safe, acyclic), (&known.max_prm, &known.fail_safe, &known.acyclic));
+    assert_eq!((c1, c2, ms2_connections), (&known.c1, &known.c2, &known.ms2_connections));
+    assert_eq!((wd_base_1ms, isochronous), (&known.wd_base_1ms, &known.isochronous));
+    assert_eq!(isochronous_required, &known.isochronous_required);
     assert!(source.contains("test.gsd"), "where it comes from is its own: {source}");
 }
 
@@ -269,6 +278,109 @@ fn the_tool_has_the_last_word_on_dpv1_status() {
     assert_eq!(Run::of(&network).phases_of(3).last().map(|phase| phase.0), Some(Phase::Operation));
 }
 
+/// A device without isochronous mode is polled in the isochronous cycle, and has no part in the clock.
+#[test]
+fn a_device_without_isochronous_mode_runs_freely_among_isochronous_ones() {
+    let gsd = with("Isochron_Mode_supp       = 1", "Isochron_Mode_supp = 0");
+    assert!(parse(&gsd).to_string().contains("can be simulated as an encoder without isochronous mode"));
+    let other =
+        "motion = { kind = \"speed\", speed = \"60 rpm\" }\n[[slave]]\naddress = 4\ndevice = \"posital-ocd-dpb1b\"\n";
+    let network = load(&gsd, DEVICE, other).unwrap_or_else(|error| panic!("{error}"));
+    assert!(!network.is_clocked(&network.slaves[0]) && network.is_clocked(&network.slaves[1]));
+    let [free, clocked] = [0, 1].map(|slave| build::set_prm(&network, &network.slaves[slave]));
+    // DPV1_Enable and Fail_Safe, no IsoM_Req, no group of the clock, no block of isochronous mode.
+    assert_eq!((free[6..10].to_vec(), free.len()), (vec![0, 0xC0, 0, 0x08], 10 + 21));
+    assert_eq!((clocked[6..10].to_vec(), clocked.len()), (vec![0x80, 0xC0, 0, 0x18], 59));
+    let run = Run::of(&network);
+    assert_eq!(run.phases_of(4).last().map(|phase| phase.0), Some(Phase::Operation));
+    assert_eq!((run.phases_of(3), run.faults_of(3)), (vec![], vec![]), "its phases never begin");
+    assert_eq!(run.counts_of(3).state, isodp::observation::SlaveState::DataExch);
+    let rows: Vec<_> = run.slave(3).filter(|row| row.cycle > 100).map(|row| row.xist1).collect();
+    assert!(rows.windows(2).all(|pair| pair[0] != pair[1]), "its position is that of each request: {rows:?}");
+    // Its times are none, and the rules of isochronous mode are not about it.
+    let error = load(&gsd, DEVICE, "t_i = \"125 us\"\n").expect_err("no T_I");
+    assert!(error.contains("slave.3.t_i: this device has no isochronous mode"), "{error}");
+    let broken = gsd
+        .replace("TBASE_DP                 = 1500", "TBASE_DP = 0")
+        .replace("TDP_MIN                  = 4", "TDP_MIN = 99");
+    assert!(load(&broken, DEVICE, other).is_ok());
+    let (room, _) = scene(&gsd, DEVICE, other);
+    for arguments in [&["plan", "one.toml"][..], &["plan", "one.toml", "--propose"], &["run", "one.toml"]] {
+        let output = room.call(arguments);
+        let text = |octets: &[u8]| String::from_utf8_lossy(octets).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}\n{}\n{}", text(&output.stdout), text(&output.stderr));
+    }
+}
+
+#[test]
+fn a_device_that_requires_isochronous_mode_has_a_master_with_synch() {
+    let gsd = with("Isochron_Mode_required   = 0", "Isochron_Mode_required = 1");
+    let further = "[[slave]]\naddress = 4\ndevice = \"posital-ocd-dpb1b\"\n[[class1]]\naddress = 7\n";
+    assert!(load(&gsd, DEVICE, further).is_ok());
+    let error = load(&gsd, DEVICE, &format!("master = 7\n{further}")).expect_err("free-running");
+    assert!(
+        error.contains("slave.3.master: slave 3 works only in isochronous mode, and its master 7 sends no SYNCH")
+            && error.contains("isodp-posital") | error.contains("Isochron_Mode_required"),
+        "{error}"
+    );
+    assert!(load(&text(), DEVICE, &format!("master = 7\n{further}")).is_ok(), "the other encoder can do without");
+}
+
+/// 25 ms are 25 steps of 1 ms: octet 8 bit 2.
+#[test]
+fn a_watchdog_in_steps_of_1_ms_needs_slaves_that_have_them() {
+    let off = "crystal = \"0 ppm\"\n[[event]]\ncycle = 200\ndo = \"power-off\"\nstation = 2\n";
+    let (room, text) = scene(&self::text(), DEVICE, off);
+    let watchdog =
+        |ms: &str| [("master.watchdog".to_owned(), ms.to_owned()), ("run.duration".to_owned(), "1 s".to_owned())];
+    let network = Scenario::load(&room.path("one.toml"), &watchdog("25 ms")).unwrap_or_else(|error| panic!("{error}"));
+    let prm = build::set_prm(&network, &network.slaves[0]);
+    assert_eq!((prm[1], prm[2], prm[7]), (25, 1, 0xC4));
+    let run = Run::of(&network);
+    let asked = run.telegrams.iter().filter(|(.., octets)| {
+        matches!(isodp::wire::Telegram::parse(octets), Ok(isodp::wire::Telegram::Data { header, .. }) if header.da.get() == 3 && header.sa.get() == 2)
+    });
+    let (_, last, ..) = asked.last().expect("a request");
+    let expired = run.observations.iter().find_map(|(at, who, what)| match what {
+        Observation::SlaveState { cause: isodp::observation::SlaveCause::Watchdog, .. } if who.get() == 3 => Some(*at),
+        _ => None,
+    });
+    let took = expired.expect("the watchdog expires") - *last;
+    assert!((took - Span::from_ms(25)).ticks().abs() <= 1, "{took}");
+    assert_eq!(
+        build::set_prm(&Scenario::load(&room.path("one.toml"), &watchdog("30 ms")).expect("good"), &network.slaves[0])
+            [7],
+        0xC0
+    );
+
+    let coarse = with("WD_Base_1ms_supp         = 1", "WD_Base_1ms_supp = 0");
+    room.write("test.GSE", &coarse);
+    let error = Scenario::load(&room.path("one.toml"), &watchdog("25 ms")).expect_err("too fine").to_string();
+    assert!(
+        error.contains("master.watchdog: a watchdog of 25 ms is too fine for slave 3")
+            && error.contains("the next is watchdog = \"30 ms\""),
+        "{error}"
+    );
+    assert!(Scenario::load(&room.path("one.toml"), &watchdog("30 ms")).is_ok());
+    let proposed = room.call(&["plan", "one.toml", "--propose", "--set", "master.watchdog=25 ms"]).stdout;
+    let proposed = String::from_utf8(proposed).expect("a text");
+    assert!(proposed.contains("watchdog = \"200 ms\""), "{proposed}");
+    // Another master's watchdog is about its own slaves.
+    let other = "[[slave]]\naddress = 4\nmaster = 7\ndevice = { gsd = \"test.GSE\" }\n[[class1]]\naddress = 7\nwatchdog = \"25 ms\"\n";
+    room.write("two.toml", text + other);
+    let error = Scenario::load(&room.path("two.toml"), &[]).expect_err("too fine").to_string();
+    assert!(error.contains("class1.1.watchdog: a watchdog of 25 ms is too fine for slave 4"), "{error}");
+}
+
+#[test]
+fn a_device_without_publisher_function_has_no_subscribers() {
+    let more = "[[slave]]\naddress = 4\ndevice = \"subscriber-drive\"\n[[link]]\npublisher = 3\nsubscriber = 4\n";
+    assert!(load(&text(), DEVICE, more).is_ok());
+    let error =
+        load(&with("Publisher_supp           = 1", "Publisher_supp = 0"), DEVICE, more).expect_err("no publisher");
+    assert!(error.contains("link.1.publisher: slave 3 cannot publish"), "{error}");
+}
+
 /// A subscriber has user parameters of its own, which the model sends and does not read.
 #[test]
 fn a_subscriber_from_a_gsd_file_follows_a_publisher() {
@@ -294,7 +406,11 @@ fn a_subscriber_from_a_gsd_file_follows_a_publisher() {
 fn a_device_that_the_model_cannot_simulate_is_refused_with_the_reason() {
     let telegram = "0xC3,0xC1,0xC5,0xFD,0x00,0x51";
     let table = [
-        ("Isochron_Mode_supp       = 1", "Isochron_Mode_supp = 0", "the device has no isochronous mode"),
+        (
+            "Isochron_Mode_supp       = 1\nIsochron_Mode_required   = 0",
+            "Isochron_Mode_supp = 0\nIsochron_Mode_required = 1",
+            "Isochron_Mode_required without Isochron_Mode_supp",
+        ),
         ("Station_Type             = 0", "Station_Type = 1", "Station_Type = 1 is not a slave"),
         ("Ident_Number             = 0x06DF", "", "there is no Ident_Number"),
         ("TBASE_IO                 = 1500", "TBASE_IO = 1501", "TBASE_IO = 1501 is none of 375,"),
@@ -389,6 +505,9 @@ fn the_page_says_what_was_ignored() {
         "Unit_Diag_Bit",
         " and 1 more",
         "24V Pins",
+        "Prm_Block_Structure_req",
+        "Set_Prm always comes in blocks",
+        "nothing here depends on it",
         "UnitDiagType",
         "slot 1 Position: Telegram 81; allowed: Telegram 81, Empty",
     ] {
@@ -467,6 +586,26 @@ fn the_program_shows_a_file_and_refuses_a_broken_one() {
     let (code, page, _) = call(&["gsd", "good.gsd"]);
     assert_eq!(code, Some(0));
     assert!(page.contains("can be simulated as an encoder: device = { gsd = \"good.gsd\" }"), "{page}");
+    // Inconsistent, but readable; what is merely missing or another device's is no fault of the file.
+    for (from, to, expected) in [
+        ("TDP_MIN                  = 4", "TDP_MIN = 3", 1),
+        ("T_PLL_W_MAX              = 240", "T_PLL_W_MAX = 0", 1),
+        ("Max_Input_Len            = 12", "Max_Input_Len = 11", 1),
+        ("C1_Max_Data_Len          = 240", "C1_Max_Data_Len = 241", 1),
+        ("C2_Max_Count_Channels    = 2", "C2_Max_Count_Channels = 50", 1),
+        ("T_PLL_W_MAX              = 240", "", 0),
+        ("C1_Response_Timeout      = 1000", "", 0),
+        ("Station_Type             = 0", "Station_Type = 1", 0),
+    ] {
+        room.write("other.gsd", with(from, to));
+        let (code, page, error) = call(&["gsd", "other.gsd"]);
+        assert_eq!((code, error.as_str()), (Some(expected), ""), "{to}: {page}");
+        let word = if expected == 1 { "error" } else { "note" };
+        assert!(page.contains("does not fit") || page.contains(" what"), "{page}");
+        assert!(page.lines().any(|line| line.split_whitespace().nth(1) == Some(word)), "{page}");
+    }
+    let (_, help, _) = call(&["gsd", "--help"]);
+    assert!(help.contains("1 it is inconsistent"), "{help}");
     let (code, page, error) = call(&["gsd", "bad.gsg"]);
     assert_eq!((code, page.as_str()), (Some(2), ""));
     assert!(

@@ -3,6 +3,7 @@
 use isodp::observation::{Observation, Phase, PllState};
 use isodp::study::row::SlaveRow;
 use isodp::study::scenario::Scenario;
+use isodp::time::Span;
 
 use crate::support::Run;
 
@@ -72,6 +73,79 @@ fn error_ns(run: &Run) -> f64 {
 
 /// A command that does not exist, for some cycles, then an acknowledgement that is held.
 const FAULT: &[(u64, u16)] = &[(200, 0x2001), (220, 0x2000), (240, 0xA000), (280, 0x2000)];
+
+/// Overrides reach into lists and tables of tables; what is not there is told with what is.
+#[test]
+fn overrides_reach_into_lists() {
+    let text = r#"
+        [run]
+        cycles = 400
+        [bus]
+        rate = "12 Mbit/s"
+        hsa = 9
+        [master]
+        address = 2
+        t_dp = "2 ms"
+        t_i = "125 us"
+        t_o = "1 ms"
+        [[segment]]
+        name = "hall"
+        cable = "100 m"
+        [[slave]]
+        address = 3
+        device = "posital-ocd-dpb1b"
+        [[slave]]
+        address = 4
+        device = "posital-ocd-dpb1b"
+        master = 7
+        [[class1]]
+        address = 7
+        [[class2]]
+        address = 1
+        [[class2.job]]
+        service = "diagnosis"
+        slave = 3
+        [[class2.job]]
+        service = "parameter-read"
+        parameters = [918, 922]
+        slave = 3
+        [[event]]
+        cycle = 100
+        do = "set-prm"
+        octets = [[24, 255], [49, 0]]
+        slave = 3
+    "#;
+    let parse = |key: &str, value: &str| Scenario::parse("o", "o.toml", text, &[(key.to_owned(), value.to_owned())]);
+    let good = |key: &str, value: &str| parse(key, value).unwrap_or_else(|error| panic!("{error}"));
+    let job = |scenario: &Scenario, number: usize| scenario.class2[0].jobs[number].clone();
+    let changed = good("class2.1.job.2.period", "5 ms");
+    assert_eq!(job(&changed, 1).period, Some(Span::from_ms(5)));
+    assert_eq!((job(&changed, 0), job(&changed, 1).works.len()), (job(&good("run.cycles", "400"), 0), 2));
+    assert_eq!(job(&good("class2.1.job.1.start", "7 ms"), 0).start, Span::from_ms(7));
+    let parameter = |scenario: &Scenario| format!("{:?}", job(scenario, 1).works[1]);
+    assert!(parameter(&good("class2.1.job.2.parameters.2", "964")).contains("964"));
+    assert_eq!(good("class1.1.least_cycle", "3 ms").class1[0].least_cycle, Span::from_ms(3));
+    assert_ne!(good("segment.1.cable", "90 m").topology, good("run.cycles", "400").topology);
+    assert_ne!(good("event.1.octets.1.2", "254").events, good("run.cycles", "400").events);
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/gsd/isodp_scancon_06df.gsd");
+    assert!(good("slave.3.device.gsd", file).slaves[0].device.source.contains("isodp_scancon"));
+    for (key, expected) in [
+        ("class2.1.job.3.period", "the list job has no number \"3\"\n  help: it has job.1 to job.2"),
+        ("class2.1.job.0.period", "the list job has no number \"0\""),
+        ("class2.1.job.period", "the list job has no number \"period\""),
+        ("class2.1.job.2.perod", "class2.1.job.2.perod: there is no such key\n  help: did you mean \"period\"?"),
+        ("class2.1.jobs.1.period", "class2.1.jobs: there is no such key\n  help: did you mean \"job\"?"),
+        ("class2.2.job.1.period", "there is no [[class2]] number \"2\""),
+        ("class1.1.least_cycl", "did you mean \"least_cycle\"?"),
+        ("segment.2.cable", "there is no [[segment]] number \"2\""),
+        ("class2.1.job.2.parameters.2.x", "entry 2 of the list has no keys, and so no \"x\""),
+        ("class2.1.job.2", "an override names a key"),
+        ("slave.3.device.gds", "did you mean \"gsd\"?"),
+    ] {
+        let error = parse(key, "5 ms").expect_err(key).to_string();
+        assert!(error.contains(expected), "{key}: {error}");
+    }
+}
 
 #[test]
 fn an_acknowledgement_shows_as_the_make_does() {

@@ -633,7 +633,8 @@ fn the_worst_scenario_can_be_planned() {
 #[test]
 fn every_rule_finds_something() {
     let drive = "functions = true\nscaling = { units_per_rev = 100, total_range = 12800 }\n[[slave]]\naddress = 9\ndevice = \
-                 \"subscriber-drive\"\n[[link]]\npublisher = 6\nsubscriber = 9\n";
+                 \"subscriber-drive\"\n[[link]]\npublisher = 6\nsubscriber = 9\n\
+                 [[event]]\ncycle = 0\ndo = \"read-parameter\"\nparameter = 918\nslave = 6\n";
     let jitter = "data_control_time = \"1 s\"\ngc_jitter = { kind = \"normal\", sigma = \"10 ns\" }\n[[slave]]";
     let scenario = to_plan(&[&THREE.replacen("[[slave]]", jitter, 1), drive].concat());
     let facts = Facts::of(&scenario);

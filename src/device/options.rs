@@ -20,8 +20,8 @@ pub struct UnitOptions {
     pub preset_value: i32,
     /// Resolution by the type key, where it is not the profile's.
     pub resolution: Option<Resolution>,
-    /// MS2 connections at the same time, 0..=49 (C2_Max_Count_Channels). Model: default 2.
-    pub ms2_connections: u8,
+    /// MS2 connections at the same time, 0..=49, where they are not the profile's.
+    pub ms2_connections: Option<u8>,
 }
 
 impl Default for UnitOptions {
@@ -33,7 +33,7 @@ impl Default for UnitOptions {
             sensor: SensorOptions::default(),
             preset_value: 0,
             resolution: None,
-            ms2_connections: 2,
+            ms2_connections: None,
         }
     }
 }

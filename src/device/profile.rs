@@ -78,9 +78,40 @@ pub struct Profile {
     pub min_slave_interval: Span,
     /// Whether it takes acyclic requests of its master (C1_Read_Write_supp).
     pub acyclic: bool,
+    /// What these requests may be (C1_Max_Data_Len, C1_Response_Timeout).
+    pub c1: AcyclicLimits,
+    /// What those of class 2 masters may be (C2_Max_Data_Len, C2_Response_Timeout).
+    pub c2: AcyclicLimits,
+    /// MS2 connections at the same time, 0..=49; 0 without C2_Read_Write_supp (C2_Max_Count_Channels).
+    pub ms2_connections: u8,
+    /// Whether its watchdog also runs in steps of 1 ms (WD_Base_1ms_supp).
+    pub wd_base_1ms: bool,
+    /// Whether it has isochronous mode (Isochron_Mode_supp).
+    pub isochronous: bool,
+    /// Whether it works in isochronous mode alone (Isochron_Mode_required).
+    pub isochronous_required: bool,
     /// Where all this comes from.
     pub source: Cow<'static, str>,
 }
+
+/// What a device's acyclic services take of one class of masters.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct AcyclicLimits {
+    /// Octets of the longest data of a record, 1..=240.
+    pub max_data: u8,
+    /// Longest time to the answer; GSD files have it in 10 ms.
+    pub response_timeout: Span,
+}
+
+impl AcyclicLimits {
+    /// What fits into a telegram, in 10 s (SIEM80F9.GSE).
+    pub const FULL: Self = Self { max_data: 240, response_timeout: Span::from_s(10) };
+}
+
+/// MS2 connections where nothing else is said. Model: the encoder manuals and GSD files have no number.
+pub const MS2_CONNECTIONS: u8 = 2;
+/// Most MS2 connections: the SAPs below the resource manager's (DP-V1).
+pub const MOST_MS2_CONNECTIONS: u8 = 49;
 
 /// What a subscriber takes (GSD keywords DXB_Max_Link_Count, DXB_Max_Data_Length).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -151,7 +182,7 @@ struct Row {
 }
 
 /// The device of this row; the rest is what all devices here share: the isochronous limits of manual 3.3 and a disc of
-/// 13 + 12 bit. Min_Slave_Intervall and Max_User_Prm_Data_Len as SIEM80F9.GSE, the longest Set_Prm for a subscriber.
+/// 13 + 12 bit. Min_Slave_Intervall, Max_User_Prm_Data_Len, WD_Base and acyclic services as SIEM80F9.GSE, the longest Set_Prm for a subscriber.
 const fn profile(row: Row) -> Profile {
     Profile {
         name: Cow::Borrowed(row.name),
@@ -184,6 +215,12 @@ const fn profile(row: Row) -> Profile {
         max_diag: row.max_diag,
         min_slave_interval: Span::from_us(100),
         acyclic: row.dxb.links == 0,
+        c1: AcyclicLimits::FULL,
+        c2: AcyclicLimits::FULL,
+        ms2_connections: MS2_CONNECTIONS,
+        wd_base_1ms: true,
+        isochronous: true,
+        isochronous_required: false,
         source: Cow::Borrowed(row.source),
     }
 }

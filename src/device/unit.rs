@@ -128,6 +128,7 @@ impl<F: Function> Unit<F> {
     /// A unit of this kind without supply.
     pub fn new(profile: impl Into<Device>, settings: UnitSettings, function: F) -> Self {
         let profile = profile.into();
+        let connections = settings.options.ms2_connections.unwrap_or(profile.ms2_connections);
         let identity = Identity {
             address: settings.address,
             ident: profile.ident,
@@ -141,8 +142,10 @@ impl<F: Function> Unit<F> {
             max_diag: profile.max_diag,
             rate: settings.rate,
             t_sdr: settings.t_sdr,
+            c1_max_data: profile.c1.max_data,
             ms2: ms2::Settings {
-                connections: settings.options.ms2_connections,
+                connections,
+                max_data: profile.c2.max_data,
                 send_timeout: ms2::send_timeout(settings.rate),
                 working: ACYCLIC_TIME,
                 profile_ident: PROFILE_IDENT,
@@ -153,7 +156,7 @@ impl<F: Function> Unit<F> {
             settings,
             iso: None,
             sensor: Sensor::new(settings.options.sensor),
-            channels: vec![Channel::EMPTY; 1 + usize::from(settings.options.ms2_connections)],
+            channels: vec![Channel::EMPTY; 1 + usize::from(connections)],
             function,
             outputs: Outputs81::default(),
             raw: 0,

@@ -63,12 +63,10 @@ pub struct Settings {
     pub address: Address,
     /// Bus parameters.
     pub bus: BusParams,
-    /// Its connections.
-    pub ms2: client::Settings,
     /// Messages in one token visit at most, 1 or more.
     pub per_token: u8,
-    /// The slaves that it asks.
-    pub slaves: Vec<Address>,
+    /// The slaves that it asks, each with what it asks of their connection.
+    pub slaves: Vec<(Address, client::Settings)>,
 }
 
 /// A slave as this master sees it.
@@ -106,7 +104,7 @@ pub struct Class2<A> {
 impl<A: Application> Class2<A> {
     /// A master without supply.
     pub fn new(settings: Settings, app: A) -> Self {
-        let partner = |&slave| Partner { connection: Client::new(slave, settings.ms2), task: None };
+        let partner = |&(slave, ms2)| Partner { connection: Client::new(slave, ms2), task: None };
         Self {
             active: Active::new(settings.address, settings.bus),
             app,
@@ -128,8 +126,8 @@ impl<A: Application> Class2<A> {
     }
 
     fn power_on(&mut self, now: Local, out: &mut Outbox) {
-        for partner in &mut self.partners {
-            *partner = Partner { connection: Client::new(partner.connection.slave(), self.settings.ms2), task: None };
+        for (partner, &(slave, ms2)) in self.partners.iter_mut().zip(&self.settings.slaves) {
+            *partner = Partner { connection: Client::new(slave, ms2), task: None };
         }
         self.active = Active::new(self.settings.address, self.settings.bus);
         self.part = Part::Away;

@@ -60,6 +60,8 @@ pub struct SlaveParams {
     pub max_diag: u8,
     /// Min_Slave_Interval, from one request of Data_Exchange to the next.
     pub min_interval: Span,
+    /// C1_Response_Timeout, after which an acyclic job is given up; the GSD file counts it in 10 ms.
+    pub ms1_timeout: Span,
 }
 
 /// A change to a telegram of the start-up, for trying how a slave takes wrong ones.
@@ -349,6 +351,7 @@ mod tests {
             get_cfg,
             max_diag: 6,
             min_interval: Span::from_us(100),
+            ms1_timeout: Span::from_s(10),
         })
     }
     /// The handler after the answers of a start-up up to `state`.

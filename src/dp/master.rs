@@ -120,8 +120,6 @@ pub struct Settings {
     pub active_spare: bool,
     /// Data_Control_Time; the mode is told to the slaves at least every third of it (Model: D5).
     pub data_control_time: Span,
-    /// C1_Response_Timeout, after which an acyclic job is given up; the GSD file counts it in 10 ms.
-    pub ms1_timeout: Span,
     /// Error_Action_Flag: back to Clear when a slave misses Data_Exchange for Data_Control_Time.
     pub auto_clear: bool,
     /// The slaves, in the order in which they are polled.
@@ -207,7 +205,7 @@ impl<A: Application> Master<A> {
             commands: Vec::new(),
             supervision: Supervision::new(settings.auto_clear, settings.data_control_time, settings.clear_for),
             startup_next: 0,
-            ms1: Client::new(settings.ms1_timeout),
+            ms1: Client::new(),
             begun: 0,
             polling: Polling::new(),
             settings,
@@ -412,7 +410,7 @@ impl<A: Application> Master<A> {
         if self.ms1.is_idle()
             && let Some(job) = self.app.acyclic()
         {
-            self.ms1.begin(now, job);
+            self.ms1.begin(now, job, self.handlers[job.slave].params().ms1_timeout);
         }
         match starting {
             Some(slave) if self.ms1.is_idle() || self.clock.coming().is_multiple_of(2) => self.startup(slave, out),

@@ -229,15 +229,16 @@ pub struct Job {
 }
 
 /// The master's side: one job at a time.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Client {
-    timeout: Span,
     job: Option<(Job, Stage)>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Stage {
     since: Local,
+    /// C1_Response_Timeout of the slave.
+    timeout: Span,
     /// The slave has the request: from now on it is polled.
     polling: bool,
 }
@@ -264,18 +265,18 @@ pub enum Progress<'a> {
 }
 
 impl Client {
-    /// A client that gives a job up after `timeout` (C1_Response_Timeout).
-    pub const fn new(timeout: Span) -> Self {
-        Self { timeout, job: None }
+    /// A client without a job.
+    pub const fn new() -> Self {
+        Self { job: None }
     }
     /// Whether there is no job.
     pub const fn is_idle(&self) -> bool {
         self.job.is_none()
     }
-    /// Begins a job. There must be none.
-    pub fn begin(&mut self, now: Local, job: Job) {
+    /// Begins a job, which is given up after `timeout` (C1_Response_Timeout of the slave). There must be none.
+    pub fn begin(&mut self, now: Local, job: Job, timeout: Span) {
         debug_assert!(self.job.is_none(), "one job at a time");
-        self.job = Some((job, Stage { since: now, polling: false }));
+        self.job = Some((job, Stage { since: now, timeout, polling: false }));
     }
     /// The slave of the job and the data unit to send next.
     pub fn next(&self) -> Option<(usize, &[u8])> {
@@ -292,8 +293,7 @@ impl Client {
     }
     /// The slave of a job whose time is over at `now`; it is given up.
     pub fn overdue(&mut self, now: Local) -> Option<usize> {
-        let timeout = self.timeout;
-        let over = self.job.take_if(|(_, stage)| now - stage.since > timeout);
+        let over = self.job.take_if(|(_, stage)| now - stage.since > stage.timeout);
         over.map(|(job, _)| job.slave)
     }
     /// Takes what came back: SC (`Ok(None)`), data, a status without data, or nothing.
@@ -393,8 +393,8 @@ mod tests {
     #[test]
     fn the_master_side_goes_on_until_an_answer_a_refusal_or_the_time_ends_it() {
         let job = || Job { slave: 3, pdu: Pdu::from_octets(&[0x5E]) };
-        let mut client = Client::new(MS * 10);
-        client.begin(at(0), job());
+        let mut client = Client::new();
+        client.begin(at(0), job(), MS * 10);
         assert_eq!(client.next(), Some((3, &[0x5E][..])));
         assert_eq!(client.answered(at(1), Err(Some(Status::Rr))), Progress::Going);
         assert_eq!(client.next(), Some((3, &[0x5E][..])), "busy: the same again");
@@ -403,12 +403,12 @@ mod tests {
         assert_eq!(client.answered(at(3), Ok(Some(&[9]))), Progress::Done { slave: 3, pdu: &[9] });
         assert!(client.is_idle());
 
-        client.begin(at(0), job());
+        client.begin(at(0), job(), MS * 10);
         assert_eq!(client.answered(at(11), Err(None)), Progress::Failed { slave: 3, why: Failure::Timeout });
-        client.begin(at(0), job());
+        client.begin(at(0), job(), MS * 10);
         let closed = client.answered(at(1), Err(Some(Status::Rs)));
         assert_eq!(closed, Progress::Failed { slave: 3, why: Failure::Closed });
-        client.begin(at(0), job());
+        client.begin(at(0), job(), MS * 10);
         assert!(!client.left(2) && client.left(3) && client.is_idle());
     }
 
@@ -460,9 +460,9 @@ mod tests {
 
     #[test]
     fn a_job_that_is_never_sent_is_given_up_too() {
-        let mut client = Client::new(MS * 10);
+        let mut client = Client::new();
         assert_eq!(client.overdue(at(99)), None, "no job");
-        client.begin(at(0), Job { slave: 3, pdu: Pdu::EMPTY });
+        client.begin(at(0), Job { slave: 3, pdu: Pdu::EMPTY }, MS * 10);
         assert_eq!(client.overdue(at(10)), None, "just in time");
         assert_eq!(client.overdue(at(11)), Some(3));
         assert!(client.is_idle());

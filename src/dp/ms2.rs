@@ -43,8 +43,6 @@ use crate::wire::{Address, Sap, Status};
 pub const TIMEOUT_UNIT: Span = Span::from_ms(10);
 /// Octets 3..=4 of an Initiate response: reads and writes records.
 pub const FEATURES: [u8; 2] = [1, 0];
-/// Octets of the longest data unit of a record, octet 2 of an Initiate response (C2_Max_Data_Len).
-pub const MAX_DATA: u8 = 240;
 /// Ends of a connection without routing: application and access level 0.
 const HERE: [u8; 2] = [0, 0];
 
@@ -60,8 +58,10 @@ pub const fn send_timeout(rate: BitRate) -> u16 {
 /// What the connections of a slave are like.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Settings {
-    /// How many, at SAP 0 and up; at most 49. Model: C2_Max_Count_Channels, default 2.
+    /// How many, at SAP 0 and up; at most 49. C2_Max_Count_Channels.
     pub connections: u8,
+    /// Octets of the longest data of a record, octet 2 of an Initiate response (C2_Max_Data_Len).
+    pub max_data: u8,
     /// Own Send_Timeout, in units of [`TIMEOUT_UNIT`].
     pub send_timeout: u16,
     /// Time from a request to its answer.
@@ -104,6 +104,8 @@ struct Connection {
     /// When the answer is ready, and when the supervision strikes.
     ready: Local,
     deadline: Local,
+    /// C2_Max_Data_Len.
+    max_data: u8,
     len: usize,
     pdu: [u8; MAX_PDU],
 }
@@ -180,6 +182,7 @@ impl Connection {
             timeout: Span::ZERO,
             ready: Local::ZERO,
             deadline: Local::ZERO,
+            max_data: 0,
             len: 0,
             pdu: [0; MAX_PDU],
         }
@@ -197,7 +200,7 @@ impl Connection {
 
     /// The resource manager gave this connection to the sender of `message`.
     fn open(&mut self, now: Local, message: &Message<'_>, settings: &Settings, out: &mut Outbox) {
-        (self.master, self.ssap) = (message.master, message.ssap);
+        (self.master, self.ssap, self.max_data) = (message.master, message.ssap, settings.max_data);
         self.timeout = TIMEOUT_UNIT * i64::from(settings.send_timeout);
         match Request::parse(message.du) {
             Ok(Request::Initiate(asked)) if is_level(asked.ends.source_type, asked.ends.source) => {
@@ -214,7 +217,7 @@ impl Connection {
                     destination: asked.ends.source,
                 };
                 let response = InitiateRes {
-                    max_len: MAX_DATA,
+                    max_len: settings.max_data,
                     features: FEATURES,
                     profile_features: [0; 2],
                     profile_ident: settings.profile_ident,
@@ -257,7 +260,7 @@ impl Connection {
             }
             // Also one that is cut short: it gets its negative answer.
             (ConnectionState::Open, _) if is_service(du) => {
-                self.len = serve(self.access(), du, MAX_DATA, records, &mut self.pdu);
+                self.len = serve(self.access(), du, self.max_data, records, &mut self.pdu);
                 self.work(ready);
             }
             (ConnectionState::Open, _) => self.abort(now, AbortCode::Format, out),

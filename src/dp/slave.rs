@@ -45,8 +45,6 @@ use crate::wire::{Address, FrameControl, Header, Sap, Service, Status};
 
 /// Time from an acyclic request to its answer. Model: none of the sources has a number.
 pub const ACYCLIC_TIME: Span = Span::from_ms(2);
-/// C1_Max_Data_Len of the encoders (octets).
-const C1_MAX_DATA: u8 = 240;
 
 /// Why a slave does not take its parameters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -146,6 +144,8 @@ pub struct Identity {
     pub rate: BitRate,
     /// Own T_SDR.
     pub t_sdr: Tbit,
+    /// C1_Max_Data_Len, the longest data of a record that its master reads or writes (octets).
+    pub c1_max_data: u8,
     /// Its connections for class 2 masters.
     pub ms2: ms2::Settings,
 }
@@ -197,6 +197,7 @@ impl Slave {
         Self {
             passive: Passive::new(identity.address, identity.rate, identity.t_sdr),
             image: Image::new(identity.outputs, identity.inputs),
+            ms1: Server::new(ACYCLIC_TIME, identity.c1_max_data),
             ms2: Manager::new(identity.ms2),
             identity,
             state: SlaveState::PowerOn,
@@ -207,7 +208,6 @@ impl Slave {
             fail_safe: false,
             publisher: false,
             dpv1: false,
-            ms1: Server::new(ACYCLIC_TIME, C1_MAX_DATA),
             known: Known::default(),
         }
     }

@@ -93,6 +93,7 @@ mod tests {
             get_cfg: false,
             max_diag: 6,
             min_interval: Span::ZERO,
+            ms1_timeout: Span::from_s(10),
         };
         let mut handlers = [3, 4].map(|address| Handler::new(params(address)));
         let ready = Answer::Data(&[0x00, 0x0C, 0x00, 0x02, 0x80, 0xF9]);

@@ -5,6 +5,7 @@ use crate::device::drive::{Drive, Subscriber};
 use crate::device::encoder::{Disc, Encoder};
 use crate::device::node::{Command, Node};
 use crate::device::options::Resolution;
+use crate::device::profile::AcyclicLimits;
 use crate::device::tool::{self, Tool};
 use crate::device::unit::{self, UnitSettings};
 use crate::dp::CLOCK_GROUP;
@@ -60,6 +61,7 @@ pub fn set_prm(scenario: &Scenario, slave: &Slave) -> Vec<u8> {
         group: if clocked { CLOCK_GROUP } else { 0 } | services.groups,
         dpv1: (DpV1Status::DPV1_ENABLE | DpV1Status::PRM_STRUCTURE)
             .with(DpV1Status::ISOM_REQ, clocked)
+            .with(DpV1Status::WD_BASE_1MS, watchdog.is_some_and(|watchdog| watchdog.base_1ms))
             .with(DpV1Status::FAIL_SAFE, slave.device.fail_safe)
             .with(DpV1Status::PUBLISHER_ENABLE, publisher)
             | preset_status(slave),
@@ -156,6 +158,7 @@ pub fn slave_params(scenario: &Scenario, slave: &Slave) -> SlaveParams {
         get_cfg: scenario.class1(slave.master).map_or(scenario.master.get_cfg, |class1| class1.get_cfg),
         max_diag: slave.device.max_diag,
         min_interval: slave.min_slave_interval(),
+        ms1_timeout: scenario.master.ms1_timeout.unwrap_or(slave.device.c1.response_timeout),
     }
 }
 
@@ -227,7 +230,6 @@ fn master_of(scenario: &Scenario) -> Master<Controller> {
         active_spare: master.active_spare,
         data_control_time: data_control_time(master),
         auto_clear: master.services.auto_clear,
-        ms1_timeout: master.ms1_timeout,
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
     let life = LifeSettings { t_mapc: master.t_mapc, start: master.life_start, delay: master.life_delay };
@@ -252,7 +254,6 @@ fn further_master(scenario: &Scenario, class1: &Class1) -> Master<Controller> {
         active_spare: false,
         data_control_time: class1.watchdog.map_or(DATA_CONTROL_TIME, scenario::Watchdog::span),
         auto_clear: false,
-        ms1_timeout: scenario.master.ms1_timeout,
         slaves: slaves.iter().map(|slave| slave_params(scenario, slave)).collect(),
     };
     let life = LifeSettings { t_mapc: 1, start: 1, delay: 0 };
@@ -306,13 +307,16 @@ fn class2_site(scenario: &Scenario, class2: &scenario::Class2) -> Site<Node> {
     });
     let jobs = jobs.collect();
     let shortest = ms2::TIMEOUT_UNIT * i64::from(ms2::send_timeout(bus.rate));
-    let ms2 = client::Settings {
-        send_timeout: class2.send_timeout.unwrap_or(shortest).div_floor(ms2::TIMEOUT_UNIT) as u16,
-        response_timeout: class2.response_timeout,
-        profile_ident: unit::PROFILE_IDENT,
+    let ms2 = |&slave: &Address| {
+        let settings = client::Settings {
+            send_timeout: class2.send_timeout.unwrap_or(shortest).div_floor(ms2::TIMEOUT_UNIT) as u16,
+            response_timeout: class2.response_timeout.unwrap_or(limits_of(scenario, slave).response_timeout),
+            profile_ident: unit::PROFILE_IDENT,
+        };
+        (slave, settings)
     };
-    let settings =
-        class2::Settings { address: class2.address, bus, ms2, per_token: class2.per_token, slaves: slaves.clone() };
+    let partners = slaves.iter().map(ms2).collect();
+    let settings = class2::Settings { address: class2.address, bus, per_token: class2.per_token, slaves: partners };
     Site {
         machine: Node::Class2(Class2::new(settings, Tool::new(slaves, jobs))),
         place: place(scenario, class2.address),
@@ -320,6 +324,11 @@ fn class2_site(scenario: &Scenario, class2: &scenario::Class2) -> Site<Node> {
         shaft: None,
         powered_at: Time::ZERO + class2.powered_at,
     }
+}
+
+/// What a slave takes of class 2 masters.
+fn limits_of(scenario: &Scenario, slave: Address) -> AcyclicLimits {
+    scenario.slave(slave).map_or(AcyclicLimits::FULL, |slave| slave.device.c2)
 }
 
 /// A station's crystal: its offset set or drawn, its start always drawn.

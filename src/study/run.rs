@@ -271,7 +271,10 @@ fn facts(scenario: &Scenario) -> Facts {
         bit_rate: scenario.bus.params.rate,
         seed: scenario.run.seed,
         slaves: slaves
-            .map(|slave| SlaveFacts { device: slave.device.name.clone().into_owned(), t_o: Some(slave.times.t_o) })
+            .map(|slave| SlaveFacts {
+                device: slave.device.name.clone().into_owned(),
+                t_o: slave.device.isochronous.then_some(slave.times.t_o),
+            })
             .collect(),
         fingerprint: Vec::new(),
     }

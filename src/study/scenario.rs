@@ -322,8 +322,9 @@ pub struct Master {
     pub life_delay: u32,
     /// Whether further tokens to itself fill the spare time (Model: D6).
     pub active_spare: bool,
-    /// C1_Response_Timeout, after which an acyclic request over MS1 is given up; a multiple of 10 ms (GSD).
-    pub ms1_timeout: Span,
+    /// When an acyclic request over MS1 is given up, a multiple of 10 ms, also by further masters; none is each slave's
+    /// C1_Response_Timeout (GSD).
+    pub ms1_timeout: Option<Span>,
     /// How it watches and tells its slaves.
     pub services: MasterServices,
 }
@@ -337,34 +338,49 @@ pub enum Crystal {
     Within(i64),
 }
 
-/// The watchdog of Set_Prm octets 2 and 3: 10 ms x factor 1 x factor 2.
+/// The watchdog of Set_Prm: WD_Base x factor 1 x factor 2 (octets 2, 3 and 8).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Watchdog {
     /// WD_Fact_1, 1..=255.
     pub factor_1: u8,
     /// WD_Fact_2, 1..=255.
     pub factor_2: u8,
+    /// WD_Base: steps of 1 ms instead of 10 ms, for slaves with WD_Base_1ms_supp (octet 8 bit 2).
+    pub base_1ms: bool,
 }
 
 impl Watchdog {
     /// Step of the watchdog, WD_Base = 0.
     pub const BASE: Span = Span::from_ms(10);
+    /// Step of the watchdog, WD_Base = 1.
+    pub const BASE_1MS: Span = Span::from_ms(1);
     /// The longest watchdog, about 650 s.
     pub const MAX: Span = Span::from_ms(10 * 255 * 255);
+    /// The watchdog where nothing else is said, 200 ms.
+    pub const USUAL: Self = Self { factor_1: 20, factor_2: 1, base_1ms: false };
 
-    /// The watchdog of exactly `span`, with the smallest second factor; `None` if two factors up to 255 cannot make it.
+    /// The watchdog of exactly `span`, in steps of 10 ms where they make it, with the smallest second factor; `None` if
+    /// two factors up to 255 cannot make it.
     pub fn of(span: Span) -> Option<Self> {
-        if span <= Span::ZERO || span > Self::MAX || !span.is_multiple_of(Self::BASE) {
+        [false, true].into_iter().find_map(|base_1ms| Self::with_base(span, base_1ms))
+    }
+    fn with_base(span: Span, base_1ms: bool) -> Option<Self> {
+        let base = if base_1ms { Self::BASE_1MS } else { Self::BASE };
+        if span <= Span::ZERO || span > Self::MAX || !span.is_multiple_of(base) {
             return None;
         }
-        let steps = span.div_floor(Self::BASE);
-        (1..=255)
-            .find(|factor| steps % factor == 0 && steps / factor <= 255)
-            .map(|factor| Self { factor_1: (steps / factor) as u8, factor_2: factor as u8 })
+        let steps = span.div_floor(base);
+        let factor = (1..=255).find(|factor| steps % factor == 0 && steps / factor <= 255);
+        factor.map(|factor| Self { factor_1: (steps / factor) as u8, factor_2: factor as u8, base_1ms })
+    }
+    /// Its step.
+    pub const fn base(self) -> Span {
+        if self.base_1ms { Self::BASE_1MS } else { Self::BASE }
     }
     /// How long it runs.
     pub const fn span(self) -> Span {
-        Span::from_ms(10 * self.factor_1 as i64 * self.factor_2 as i64)
+        let ms = if self.base_1ms { 1 } else { 10 };
+        Span::from_ms(ms * self.factor_1 as i64 * self.factor_2 as i64)
     }
 }
 
@@ -624,7 +640,7 @@ pub(crate) mod tests {
                 life_start: 1,
                 life_delay: 0,
                 active_spare: false,
-                ms1_timeout: Span::from_s(10),
+                ms1_timeout: None,
                 services: MasterServices::default(),
             },
             class1: Vec::new(),
@@ -648,9 +664,14 @@ pub(crate) mod tests {
         assert_eq!(factors(200), Some((20, 1)));
         assert_eq!(factors(2_560), Some((128, 2)));
         assert_eq!(factors(650_250), Some((255, 255)));
-        // 257 is a prime, 205 is no multiple of 10, and the rest is out of range.
-        assert_eq!([2_570, 205, 0, -10, 650_260].map(factors), [None; 5]);
-        for ms in (10..20_000).step_by(10) {
+        // 257 and 367 are primes, and the rest is out of range.
+        assert_eq!([2_570, 7 * 367, 0, -10, 650_260].map(factors), [None; 5]);
+        // What is no multiple of 10 ms has steps of 1 ms, up to 65 s.
+        let fine = |ms| Watchdog::of(Span::from_ms(ms)).map(|w| (w.factor_1, w.factor_2, w.base_1ms));
+        assert_eq!([205, 25, 1].map(fine), [205, 25, 1].map(|ms: u8| Some((ms, 1, true))));
+        assert_eq!([65_025, 65_035, 20].map(fine), [Some((255, 255, true)), None, Some((2, 1, false))]);
+        assert_eq!(Watchdog::of(Span::from_us(20_500)), None);
+        for ms in 1..20_000 {
             if let Some(watchdog) = Watchdog::of(Span::from_ms(ms)) {
                 assert_eq!(watchdog.span(), Span::from_ms(ms));
             }

@@ -119,7 +119,14 @@ impl Bench {
             max_diag: 16,
             rate: BitRate::M12,
             t_sdr: Tbit(30),
-            ms2: ms2::Settings { connections: 0, send_timeout: 100, working: Span::ZERO, profile_ident: 0 },
+            c1_max_data: 240,
+            ms2: ms2::Settings {
+                connections: 0,
+                max_data: 240,
+                send_timeout: 100,
+                working: Span::ZERO,
+                profile_ident: 0,
+            },
         };
         let slave = Slave::new(identity);
         let mut bench = Self { slave, device: Device::default(), now: Local::ZERO, fcb: false, out: Outbox::new() };

@@ -33,6 +33,11 @@ enum Sent {
     Request(u8, u8, bool, Option<Function>),
 }
 
+/// What it asks of every connection.
+const fn ms2() -> client::Settings {
+    client::Settings { send_timeout: 100, response_timeout: Span::from_s(1), profile_ident: 0x3D00 }
+}
+
 /// A station with its timers, and slaves that answer at once: 3 and 4, which have one connection at SAP 0.
 struct Bench {
     station: Class2<Fake>,
@@ -46,9 +51,8 @@ impl Bench {
     fn new(task: Option<Task>, per_token: u8, t_tr: u32) -> Self {
         let mut bus = BusParams::profile(BitRate::M12);
         (bus.hsa, bus.t_tr) = (4, Tbit(t_tr));
-        let ms2 = client::Settings { send_timeout: 100, response_timeout: Span::from_s(1), profile_ident: 0x3D00 };
-        let slaves = [3, 4].into_iter().filter_map(Address::new).collect();
-        let settings = Settings { address: OWN, bus, ms2, per_token, slaves };
+        let slaves = [3, 4].into_iter().filter_map(Address::new).map(|slave| (slave, ms2())).collect();
+        let settings = Settings { address: OWN, bus, per_token, slaves };
         let station = Class2::new(settings, Fake { task, ended: Vec::new() });
         let mut bench =
             Self { station, now: Local::ZERO, timers: [None; Timer::ALL.len()], sent: Vec::new(), last: [0; 5] };
@@ -191,8 +195,7 @@ fn a_lost_token_ends_the_message() {
         bench.station.settings.slaves.clear();
         // Slaves that are not there: the answer is awaited.
         bench.station.partners.truncate(1);
-        bench.station.partners[0].connection =
-            Client::new(Address::new(2).expect("an address"), bench.station.settings.ms2);
+        bench.station.partners[0].connection = Client::new(Address::new(2).expect("an address"), ms2());
         while !matches!(bench.station.part, Part::Message(0)) {
             bench.wait();
         }

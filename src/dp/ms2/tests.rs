@@ -55,7 +55,8 @@ struct Bench {
 }
 impl Bench {
     fn new() -> Self {
-        let settings = Settings { connections: 2, send_timeout: 100, working: WORKING, profile_ident: 0x3D00 };
+        let settings =
+            Settings { connections: 2, max_data: 240, send_timeout: 100, working: WORKING, profile_ident: 0x3D00 };
         Self { manager: Manager::new(settings), records: Each::default(), seen: Vec::new() }
     }
     fn ask_as(&mut self, master: Address, now: Local, sap: u8, du: &[u8]) -> Result<Vec<u8>, Option<Status>> {
@@ -262,7 +263,8 @@ fn send_timeouts_follow_the_rate() {
 fn the_telegrams_of_an_opening() {
     use crate::wire::{Fcb, Frame, Header, Service, Telegram};
     let hex = |text: &str| -> Vec<u8> { text.split(' ').map(|octet| u8::from_str_radix(octet, 16).unwrap()).collect() };
-    let settings = Settings { connections: 2, send_timeout: 1_000, working: WORKING, profile_ident: 0x3D00 };
+    let settings =
+        Settings { connections: 2, max_data: 240, send_timeout: 1_000, working: WORKING, profile_ident: 0x3D00 };
     let (mut manager, mut records, mut out) = (Manager::new(settings), Each::default(), Outbox::new());
     let slave = Address::new(6).unwrap();
     let master = Address::new(2).unwrap();

@@ -2,7 +2,10 @@
 
 use super::file::{File, Value};
 use super::prm::UserPrm;
-use crate::device::profile::{DISC, DxbLimits, FUNCTIONS_MIN, GAP_MIN, MAX_PRM, MIN_WINDOW, Profile};
+use crate::device::profile::{
+    AcyclicLimits, DISC, DxbLimits, FUNCTIONS_MIN, GAP_MIN, MAX_PRM, MIN_WINDOW, MOST_MS2_CONNECTIONS, MS2_CONNECTIONS,
+    Profile,
+};
 use crate::study::scenario::{Fault, nearest};
 use crate::time::{BitRate, Span, Tbit};
 use crate::wire::config::{self, TELEGRAM_81};
@@ -16,8 +19,29 @@ pub struct Finding {
     pub line: Option<usize>,
     /// What does not fit, and what is made of it.
     pub message: String,
+    /// How bad it is for the file.
+    pub weight: Weight,
     /// Whether the model cannot simulate the device because of it.
     pub refuses: bool,
+}
+
+/// How bad a [`Finding`] is for the file.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Weight {
+    /// Something is left out or said twice, and the meaning is clear; or the model has no such device.
+    Note,
+    /// The file contradicts itself or what the GSD specification allows.
+    Error,
+}
+
+impl Weight {
+    /// The word for it.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Note => "note",
+            Self::Error => "error",
+        }
+    }
 }
 
 /// Octets that a unit of the model exchanges: those of telegram 81.
@@ -52,18 +76,22 @@ impl File {
     pub(super) fn line(&self, keyword: &str) -> Option<usize> {
         self.values.get(keyword).map(|(_, at)| at.line)
     }
+    /// The number that a keyword of isochronous mode has; without that mode it says nothing.
+    fn isochronous(&self, keyword: &str) -> Option<u32> {
+        self.number(keyword).filter(|_| self.flag("Isochron_Mode_supp"))
+    }
     /// T_BASE_DP (1/12 us). 1500 is the one that every slave knows.
     fn t_base_dp(&self) -> u32 {
-        self.number("TBASE_DP").unwrap_or(1_500)
+        self.isochronous("TBASE_DP").unwrap_or(1_500)
     }
     /// T_BASE_IO (1/12 us).
     fn t_base_io(&self) -> u32 {
-        self.number("TBASE_IO").unwrap_or(1_500)
+        self.isochronous("TBASE_IO").unwrap_or(1_500)
     }
     /// The shortest and the longest T_DP (1/12 us).
     fn t_dp(&self) -> (u64, u64) {
         let units = |keyword, usual| {
-            self.number(keyword).map_or(usual, |number| u64::from(number) * u64::from(self.t_base_dp()))
+            self.isochronous(keyword).map_or(usual, |number| u64::from(number) * u64::from(self.t_base_dp()))
         };
         (units("TDP_MIN", *IsoM::T_DP_RANGE.start()), units("TDP_MAX", *IsoM::T_DP_RANGE.end()))
     }
@@ -103,6 +131,23 @@ impl File {
             BitRate::M6 => all.b6000000,
             BitRate::M12 => all.b12000000,
         }))
+    }
+}
+
+impl File {
+    /// What acyclic services of one class take.
+    fn acyclic_limits(&self, max_data: &str, response_timeout: &str) -> AcyclicLimits {
+        let full = AcyclicLimits::FULL;
+        let time = self.number(response_timeout).filter(|&steps| steps > 0);
+        AcyclicLimits {
+            max_data: self.number(max_data).map_or(full.max_data, |octets| octets.clamp(1, full.max_data.into()) as u8),
+            response_timeout: time.map_or(full.response_timeout, |steps| Span::from_ms(10) * i64::from(steps)),
+        }
+    }
+    /// MS2 connections.
+    fn ms2_connections(&self) -> u8 {
+        let channels = self.number("C2_Max_Count_Channels").unwrap_or(MS2_CONNECTIONS.into());
+        if self.flag("C2_Read_Write_supp") { channels.min(MOST_MS2_CONNECTIONS.into()) as u8 } else { 0 }
     }
 }
 
@@ -167,7 +212,8 @@ pub(super) fn profile(file: &File, module_name: Option<&str>) -> Result<Profile,
 /// The profile with a module that was found good.
 fn of_module(file: &File, config: &[u8], subscriber: bool) -> Profile {
     let iso_units = |keyword, usual: u32| file.number(keyword).unwrap_or(usual);
-    let io = |keyword| Span::from_iso_units(iso_units(keyword, 1).max(1).saturating_mul(file.t_base_io()));
+    let io =
+        |keyword| Span::from_iso_units(file.isochronous(keyword).unwrap_or(1).max(1).saturating_mul(file.t_base_io()));
     let (t_dp_min, t_dp_max) = file.t_dp();
     let t_dp =
         |units: u64| Span::from_iso_units(units.clamp(*IsoM::T_DP_RANGE.start(), *IsoM::T_DP_RANGE.end()) as u32);
@@ -200,7 +246,7 @@ fn of_module(file: &File, config: &[u8], subscriber: bool) -> Profile {
         t_o_min: io("TO_MIN"),
         gap_min: GAP_MIN,
         functions_min: FUNCTIONS_MIN.max(io("TI_MIN")),
-        t_pll_w_max: iso_units("T_PLL_W_MAX", 12) as u16,
+        t_pll_w_max: file.isochronous("T_PLL_W_MAX").unwrap_or(12) as u16,
         min_window: MIN_WINDOW,
         steps_per_rev: DISC.steps_per_rev,
         revolutions: DISC.revolutions,
@@ -214,6 +260,12 @@ fn of_module(file: &File, config: &[u8], subscriber: bool) -> Profile {
         max_diag: iso_units("Max_Diag_Data_Len", 6).clamp(6, 244) as u8,
         min_slave_interval: Span::from_us(100) * i64::from(iso_units("Min_Slave_Intervall", 1)),
         acyclic: file.flag("C1_Read_Write_supp") && !subscriber,
+        c1: file.acyclic_limits("C1_Max_Data_Len", "C1_Response_Timeout"),
+        c2: file.acyclic_limits("C2_Max_Data_Len", "C2_Response_Timeout"),
+        ms2_connections: file.ms2_connections(),
+        wd_base_1ms: file.flag("WD_Base_1ms_supp"),
+        isochronous: file.flag("Isochron_Mode_supp"),
+        isochronous_required: file.flag("Isochron_Mode_required"),
         source: Cow::Borrowed(""),
     }
 }
@@ -253,11 +305,12 @@ pub(super) fn findings(file: &File) -> Vec<Finding> {
     all.identity();
     all.isochronous();
     all.rates();
+    all.acyclic();
     all.modules();
     all.parameters();
     for &(keyword, line) in &file.repeated {
         let message = format!("{keyword} was there before; the last one counts");
-        all.found.push(Finding { line: Some(line), message, refuses: false });
+        all.found.push(Finding { line: Some(line), message, weight: Weight::Note, refuses: false });
     }
     all.found
 }
@@ -268,17 +321,30 @@ struct Findings<'a> {
 }
 
 impl Findings<'_> {
-    fn note(&mut self, keyword: &str, message: String) {
-        self.found.push(Finding { line: self.file.line(keyword), message, refuses: false });
+    fn add(&mut self, keyword: &str, message: String, weight: Weight, refuses: bool) {
+        self.found.push(Finding { line: self.file.line(keyword), message, weight, refuses });
     }
+    /// Something that is taken as it is meant.
+    fn note(&mut self, keyword: &str, message: String) {
+        self.add(keyword, message, Weight::Note, false);
+    }
+    /// A contradiction that does no harm here.
+    fn wrong(&mut self, keyword: &str, message: String) {
+        self.add(keyword, message, Weight::Error, false);
+    }
+    /// A contradiction, so that the device cannot be simulated.
     fn refuse(&mut self, keyword: &str, message: String) {
-        self.found.push(Finding { line: self.file.line(keyword), message, refuses: true });
+        self.add(keyword, message, Weight::Error, true);
+    }
+    /// A device that the model has not.
+    fn unknown(&mut self, keyword: &str, message: String) {
+        self.add(keyword, message, Weight::Note, true);
     }
 
     fn identity(&mut self) {
         for (keyword, what) in [("Station_Type", "a slave"), ("Protocol_Ident", "PROFIBUS DP")] {
             if let Some(number) = self.file.number(keyword).filter(|&number| number != 0) {
-                self.refuse(keyword, format!("{keyword} = {number} is not {what}"));
+                self.unknown(keyword, format!("{keyword} = {number} is not {what}"));
             }
         }
         if self.file.number("Ident_Number").is_none() {
@@ -289,13 +355,16 @@ impl Findings<'_> {
     fn isochronous(&mut self) {
         let file = self.file;
         if !file.flag("Isochron_Mode_supp") {
-            return self
-                .refuse("Isochron_Mode_supp", "the device has no isochronous mode (Isochron_Mode_supp)".to_owned());
+            if file.flag("Isochron_Mode_required") {
+                let message = "Isochron_Mode_required without Isochron_Mode_supp".to_owned();
+                self.refuse("Isochron_Mode_required", message);
+            }
+            return;
         }
         for keyword in ["DPV1_Slave", "Prm_Block_Structure_supp"] {
             if !file.flag(keyword) {
                 let message = format!("isochronous mode without {keyword}: its parameters are a block of a DPV1 slave");
-                self.note(keyword, message);
+                self.wrong(keyword, message);
             }
         }
         for keyword in ["TBASE_DP", "TBASE_IO"] {
@@ -309,7 +378,7 @@ impl Findings<'_> {
         for (keyword, units) in [("TDP_MIN", min), ("TDP_MAX", max)] {
             if !IsoM::T_DP_RANGE.contains(&units) {
                 let base = file.t_base_dp();
-                self.note(
+                self.wrong(
                     keyword,
                     format!(
                         "{keyword} x TBASE_DP = {} x {base} / 12 us is not within 500 us to 32 ms",
@@ -344,8 +413,9 @@ impl Findings<'_> {
 
     fn rates(&mut self) {
         let file = self.file;
-        if !BitRate::ALL.iter().any(|&rate| rate >= BitRate::M1_5 && file.works_at(rate)) {
-            self.refuse("1.5M_supp", "no bit rate from 1.5 Mbit/s on, where isochronous mode begins".to_owned());
+        let isochronous = file.flag("Isochron_Mode_supp");
+        if isochronous && !BitRate::ALL.iter().any(|&rate| rate >= BitRate::M1_5 && file.works_at(rate)) {
+            self.unknown("1.5M_supp", "no bit rate from 1.5 Mbit/s on, where isochronous mode begins".to_owned());
         }
         for &rate in BitRate::ALL {
             let name = File::rate_name(rate);
@@ -357,10 +427,41 @@ impl Findings<'_> {
                 }
                 Some(bits) if file.works_at(rate) && !TSDR.contains(&bits) => {
                     let message = format!("{keyword} = {bits} is not within {} to {}", TSDR.start(), TSDR.end());
-                    self.note(&keyword, message);
+                    self.wrong(&keyword, message);
                 }
                 _ => {}
             }
+        }
+    }
+
+    /// Each class of acyclic services has its length and its time.
+    fn acyclic(&mut self) {
+        let file = self.file;
+        for class in ["C1", "C2"].into_iter().filter(|class| file.flag(&format!("{class}_Read_Write_supp"))) {
+            for (end, longest, taken) in
+                [("Max_Data_Len", u32::from(AcyclicLimits::FULL.max_data), "240"), ("Response_Timeout", 65_535, "10 s")]
+            {
+                let keyword = format!("{class}_{end}");
+                match file.number(&keyword) {
+                    None => self.note(&keyword, format!("there is no {keyword}; it is taken as {taken}")),
+                    Some(number) if !(1..=longest).contains(&number) => {
+                        self.wrong(&keyword, format!("{keyword} = {number} is not within 1 to {longest}"));
+                    }
+                    Some(_) => {}
+                }
+            }
+        }
+        let channels = file.number("C2_Max_Count_Channels");
+        match channels {
+            None if file.flag("C2_Read_Write_supp") => {
+                let message = format!("there is no C2_Max_Count_Channels; it is taken as {MS2_CONNECTIONS}");
+                self.note("C2_Read_Write_supp", message);
+            }
+            Some(number) if number > MOST_MS2_CONNECTIONS.into() => {
+                let message = format!("C2_Max_Count_Channels = {number} is more than {MOST_MS2_CONNECTIONS}");
+                self.wrong("C2_Max_Count_Channels", message);
+            }
+            _ => {}
         }
     }
 
@@ -383,12 +484,12 @@ impl Findings<'_> {
                     format!("module \"{name}\" has {octets} octets, more than {keyword}")
                 }
             };
-            self.found.push(Finding { line: Some(at.line), message, refuses: false });
+            self.found.push(Finding { line: Some(at.line), message, weight: Weight::Error, refuses: false });
         }
         let isochronous = file.flag("Isochron_Mode_supp") && !file.flag("Subscriber_supp");
         if isochronous && !file.description.available_modules.iter().any(|module| module.config == TELEGRAM_81) {
             let message = "no module is telegram 81 (C3 C1 C5 FD 00 51)".to_owned();
-            self.found.push(Finding { line: None, message, refuses: true });
+            self.found.push(Finding { line: None, message, weight: Weight::Note, refuses: true });
         }
     }
 
@@ -406,7 +507,7 @@ impl Findings<'_> {
             let message = format!(
                 "Max_User_Prm_Data_Len = {limit}, but the preset octets and the isochronous block are {needed} octets"
             );
-            self.note("Max_User_Prm_Data_Len", message);
+            self.wrong("Max_User_Prm_Data_Len", message);
         }
         if file.flag("Subscriber_supp") && file.number("DXB_Max_Link_Count").is_none() {
             let message = format!("a subscriber without DXB_Max_Link_Count; it is taken as {}", DxbLimits::MOST_LINKS);

@@ -179,6 +179,23 @@ pub(super) const KEYWORDS: &[Keyword] = &[
     keyword("DXB_Subscribertable_Block_Location", Dxb, (U8, Plain), false, "where its table goes"),
 ];
 
+/// Keywords that are understood and do nothing here, each with the reason.
+pub(super) const WITHOUT_EFFECT: &[(&str, &str)] = &[
+    ("Auto_Baud_supp", "slaves know the bit rate from the start"),
+    ("Modular_Station", "a slave has one module"),
+    ("Max_Module", "a slave has one module"),
+    ("Modul_Offset", "a slave has one module; records and parameters are those of slot 1 (manual 6.3)"),
+    ("User_Prm_Data_Len", "the octets themselves are read"),
+    ("Set_Slave_Add_supp", "addresses are the scenario's"),
+    ("C1_Read_Write_required", "MS1 is open in data exchange, used or not"),
+    ("Check_Cfg_Mode", "a slave takes the configuration of its module alone"),
+    ("Prm_Block_Structure_req", "Set_Prm always comes in blocks"),
+    (
+        "DXB_Subscribertable_Block_Location",
+        "the tool puts the table behind all other blocks, which slaves find by type",
+    ),
+];
+
 /// The keyword `name`, in capitals or not.
 pub(super) fn find(name: &str) -> Option<&'static Keyword> {
     KEYWORDS.iter().find(|keyword| keyword.name.eq_ignore_ascii_case(name))
@@ -193,6 +210,10 @@ mod tests {
     fn keywords_are_unique_and_every_rate_has_its_two() {
         for (i, a) in KEYWORDS.iter().enumerate() {
             assert!(KEYWORDS[..i].iter().all(|b| !b.name.eq_ignore_ascii_case(a.name)), "{}", a.name);
+        }
+        for (i, (name, reason)) in WITHOUT_EFFECT.iter().enumerate() {
+            assert!(find(name).is_some_and(|keyword| keyword.name == *name) && !reason.is_empty(), "{name}");
+            assert!(WITHOUT_EFFECT[..i].iter().all(|other| other.0 != *name), "{name}");
         }
         let count = |start: &str, end: &str| {
             KEYWORDS.iter().filter(|k| k.group == Rates && k.name.starts_with(start) && k.name.ends_with(end)).count()

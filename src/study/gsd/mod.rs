@@ -16,7 +16,7 @@ mod show;
 
 use super::scenario::{self, Fault, Position, Problem};
 use crate::device::profile::Device;
-pub use device::Finding;
+pub use device::{Finding, Weight};
 use file::File;
 use lex::At;
 pub use prm::{Touched, UserPrm};
@@ -74,6 +74,10 @@ impl Gsd {
     /// What does not fit together in it.
     pub fn findings(&self) -> Vec<Finding> {
         device::findings(&self.file)
+    }
+    /// Whether the file contradicts itself or the GSD specification: one of [`Self::findings`] is an error.
+    pub fn is_inconsistent(&self) -> bool {
+        self.findings().iter().any(|finding| finding.weight == Weight::Error)
     }
     /// The device with the module called `module`. Without a name it is the only module, or the one with telegram 81.
     ///

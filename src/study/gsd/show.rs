@@ -2,7 +2,7 @@
 
 use super::device::{hex, title};
 use super::file::{File, Value};
-use super::keywords::{Group, KEYWORDS, Keyword, Unit};
+use super::keywords::{Group, KEYWORDS, Keyword, Unit, WITHOUT_EFFECT};
 use super::prm::{UserPrm, allowed};
 use super::{Gsd, device};
 use crate::study::report::aligned;
@@ -47,8 +47,9 @@ impl Gsd {
         let line = |line: Option<usize>| line.map_or_else(|| "-".to_owned(), |line| line.to_string());
         let count = found.len();
         let shown = found.into_iter().take(ROWS);
-        let rows: Vec<_> = shown.map(|finding| vec![line(finding.line), finding.message]).collect();
-        lines.extend(aligned(&["line", "what"], &[1], &rows));
+        let rows: Vec<_> =
+            shown.map(|finding| vec![line(finding.line), finding.weight.text().to_owned(), finding.message]).collect();
+        lines.extend(aligned(&["line", "", "what"], &[1, 2], &rows));
         more(count, lines);
     }
     fn verdict(&self, lines: &mut Vec<String>) {
@@ -56,7 +57,8 @@ impl Gsd {
         match device::profile(&self.file, None) {
             Ok(profile) => {
                 let function = if profile.subscriber { "a subscriber drive" } else { "an encoder" };
-                lines.push(format!("can be simulated as {function}: device = {{ gsd = \"{}\" }}", self.name));
+                let mode = if profile.isochronous { "" } else { " without isochronous mode, which runs freely" };
+                lines.push(format!("can be simulated as {function}{mode}: device = {{ gsd = \"{}\" }}", self.name));
                 lines.push(format!(
                     "not in a GSD file: disc of {} x {} steps (resolution), T_O to the latch {}, with octet 15 bit 1 {} (Model)",
                     profile.steps_per_rev, profile.revolutions, profile.gap_min, profile.functions_min
@@ -82,7 +84,9 @@ fn group_table(file: &File, group: Group, lines: &mut Vec<String>) {
         let (shown, means) = shown(file, keyword, value);
         Some(vec![keyword.name.to_owned(), shown, means, at.line.to_string()])
     };
-    let rows: Vec<_> = KEYWORDS.iter().filter(|keyword| keyword.group == group).filter_map(row).collect();
+    let has_effect = |keyword: &&Keyword| WITHOUT_EFFECT.iter().all(|(name, _)| *name != keyword.name);
+    let of_group = KEYWORDS.iter().filter(|keyword| keyword.group == group);
+    let rows: Vec<_> = of_group.filter(has_effect).filter_map(row).collect();
     if !rows.is_empty() {
         lines.push(String::new());
         lines.extend(aligned(&[group.title(), "value", "", "line"], &[0, 1, 2], &rows));
@@ -177,16 +181,21 @@ fn ignored(file: &File, lines: &mut Vec<String>) {
             None => rows.push((keyword, vec![*line])),
         }
     }
-    if rows.is_empty() {
+    let known = WITHOUT_EFFECT.iter().filter_map(|&(keyword, reason)| {
+        let (_, at) = file.values.get(keyword)?;
+        Some(vec![keyword.to_owned(), at.line.to_string(), reason.to_owned()])
+    });
+    let known: Vec<_> = known.collect();
+    if rows.is_empty() && known.is_empty() {
         return;
     }
     lines.push(String::new());
     let row = |(keyword, places): &(&str, Vec<usize>)| {
         let first = places[0].to_string();
         let all = if places.len() == 1 { first } else { format!("{first} and {} more", places.len() - 1) };
-        vec![(*keyword).to_owned(), all]
+        vec![(*keyword).to_owned(), all, "nothing here depends on it".to_owned()]
     };
-    let shown: Vec<_> = rows.iter().take(ROWS).map(row).collect();
-    lines.extend(aligned(&["ignored, without an effect here", "line"], &[0, 1], &shown));
+    let shown: Vec<_> = known.into_iter().chain(rows.iter().take(ROWS).map(row)).collect();
+    lines.extend(aligned(&["ignored, without an effect here", "line", "reason"], &[0, 1, 2], &shown));
     more(rows.len(), lines);
 }

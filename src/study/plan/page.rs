@@ -156,7 +156,7 @@ fn instants(facts: &Facts<'_>, lines: &mut Vec<String>) {
     let (scenario, plan) = (facts.scenario, &facts.plan);
     let master = &scenario.master;
     let same = |a: &Slave, b: &Slave| a.device == b.device && a.times == b.times && a.functions == b.functions;
-    let slaves: Vec<_> = scenario.configured().collect();
+    let slaves: Vec<_> = scenario.configured().filter(|slave| slave.device.isochronous).collect();
     let rows = slaves.chunk_by(|a, b| same(a, b)).map(|group| {
         let slave = group[0];
         let (times, device) = (slave.times, &slave.device);
@@ -225,7 +225,7 @@ fn drawing(facts: &Facts<'_>, lines: &mut Vec<String>) {
     strip.paint(plan.t_dx + t_id1, plan.t_dx + plan.gap, 'G');
     strip.paint(plan.t_dx + plan.gap + t_id1, plan.t_dx + plan.gap + plan.token, 't');
     strip.paint(whole - bus.span(super::SYNCH), whole, 'S');
-    for slave in scenario.configured() {
+    for slave in scenario.configured().filter(|slave| slave.device.isochronous) {
         marks.paint(slave.times.t_o, slave.times.t_o, 'O');
         marks.paint(t_dp - slave.times.t_i, t_dp - slave.times.t_i, 'I');
     }

@@ -19,7 +19,7 @@ use crate::time::{Span, Tbit};
 /// spare.
 const WATCHDOG_CYCLES: i64 = 3;
 /// The watchdog where the scenario's is too short: longer than three of the longest T_DP.
-const WATCHDOG: Watchdog = Watchdog { factor_1: 20, factor_2: 1 };
+const WATCHDOG: Watchdog = Watchdog::USUAL;
 /// How often bus parameters are brought nearer to each other.
 const ROUNDS: usize = 8;
 
@@ -44,15 +44,18 @@ impl Proposal {
             window(slave, network.master.gc_jitter);
         }
         let plan = Plan::of(&network);
-        for slave in network.slaves.iter_mut().filter(|slave| !slave.silent) {
+        for slave in network.slaves.iter_mut().filter(|slave| !slave.silent && slave.device.isochronous) {
             slave.times.t_i = shortest_t_i(slave);
             slave.times.t_o = smallest_t_o(plan.t_dx_told(), slave.device.t_o_min, slave.device.io_grid());
         }
         let grid = grid(&network);
         network.master.t_dp = shortest_t_dp(&network, &plan).ceil_to(grid);
-        let outlasts = |watchdog: Watchdog| watchdog.span() > network.master.t_dp * WATCHDOG_CYCLES;
+        let fine = network.configured().all(|slave| slave.device.wd_base_1ms);
+        let good = |watchdog: Watchdog| {
+            watchdog.span() > network.master.t_dp * WATCHDOG_CYCLES && (fine || !watchdog.base_1ms)
+        };
         network.master.watchdog =
-            network.master.watchdog.map(|watchdog| if outlasts(watchdog) { watchdog } else { WATCHDOG });
+            network.master.watchdog.map(|watchdog| if good(watchdog) { watchdog } else { WATCHDOG });
         let services = &mut network.master.services;
         services.data_control_time =
             services.data_control_time.map(|time| time.max(network.master.t_dp * LEAST_CONTROL_CYCLES));
@@ -156,7 +159,13 @@ fn grid(network: &Scenario) -> Span {
         }
         a / x * b
     };
-    Span::from_ticks(network.configured().map(|slave| slave.device.dp_grid().ticks()).fold(1, common))
+    Span::from_ticks(
+        network
+            .configured()
+            .filter(|slave| network.is_clocked(slave))
+            .map(|slave| slave.device.dp_grid().ticks())
+            .fold(1, common),
+    )
 }
 
 /// The shortest T_DP that all slaves allow and that holds everything, off the grid.
@@ -166,9 +175,12 @@ fn shortest_t_dp(network: &Scenario, plan: &Plan) -> Span {
     let jitter = if master.accumulate { jitter } else { jitter * 2 };
     let whole = plan.content() + jitter;
     let needed = |slave: &Slave| {
+        let start_up = plan.start_up(network, slave, build::set_prm(network, slave).len());
+        if !network.is_clocked(slave) {
+            return start_up.max(slave.min_slave_interval());
+        }
         let times = slave.times.t_o + slave.device.gap_min(slave.functions) + slave.times.t_i;
         let window = slave.options.pll.min_window * 4;
-        let start_up = plan.start_up(network, slave, build::set_prm(network, slave).len());
         times.max(window).max(start_up).max(slave.device.t_dp_min).max(slave.min_slave_interval())
     };
     let shortest = network.configured().map(needed).max().unwrap_or_default().max(whole).max(Span::from_us(500));
@@ -255,7 +267,7 @@ fn master(text: &mut String, scenario: &Scenario) {
     segment(text, scenario, master.segment);
     let _ = writeln!(text, "t_dp = \"{}\"", exact(master.t_dp));
     let _ = writeln!(text, "t_mapc = {}", master.t_mapc);
-    if let Some(first) = scenario.configured().next() {
+    if let Some(first) = first(scenario) {
         let notes =
             ["latch before the end of the cycle", "set points in force after its start", "half width of the window"];
         for ((key, span), note) in times(first).into_iter().zip(notes) {
@@ -278,6 +290,10 @@ fn master(text: &mut String, scenario: &Scenario) {
     let _ = writeln!(text, "gc_jitter = {}", jitter(master.gc_jitter, master.accumulate));
 }
 
+/// The slave whose times are the master's keys: the first that is clocked.
+fn first(scenario: &Scenario) -> Option<&Slave> {
+    scenario.configured().find(|slave| scenario.is_clocked(slave))
+}
 /// The times that slaves inherit from the master.
 fn times(slave: &Slave) -> [(&'static str, Span); 3] {
     [("t_i", slave.times.t_i), ("t_o", slave.times.t_o), ("t_pll_w", slave.times.t_pll_w)]
@@ -285,7 +301,7 @@ fn times(slave: &Slave) -> [(&'static str, Span); 3] {
 
 /// One table for neighbours that differ in their addresses alone.
 fn slaves(text: &mut String, scenario: &Scenario) {
-    let Some(first) = scenario.configured().next() else { return };
+    let Some(first) = first(scenario).or(scenario.configured().next()) else { return };
     let inherited = times(first);
     let count = scenario.slaves.len() as u64;
     // On one cable slaves are spread evenly if nothing else is said; on segments the place is always said.
@@ -317,7 +333,7 @@ fn table(slave: &Slave, inherited: &[(&str, Span)], spread: Option<u64>, scenari
         let _ = writeln!(text, "t_sdr = \"{}\"", slave.t_sdr);
     }
     for ((key, span), (_, usual)) in times(slave).into_iter().zip(inherited) {
-        if span != *usual {
+        if span != *usual && slave.device.isochronous {
             let _ = writeln!(text, "{key} = \"{}\"", exact(span));
         }
     }

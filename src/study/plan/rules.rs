@@ -9,6 +9,8 @@ mod cycle;
 mod instants;
 pub(super) mod services;
 
+pub(in crate::study) use cycle::coarse_watchdog;
+
 use super::Plan;
 use super::finding::{Amount, Finding, Key, Relation};
 use crate::device::profile::Profile;
@@ -91,7 +93,7 @@ pub static CYCLE: &[Rule] = &[
     Rule::must("T_BASE_DP, T_BASE_IO are time bases", "Set_Prm block 04", cycle::time_bases).clocked(),
     Rule::must("1 <= T_MAPC <= 14 (T_DP)", "manual 3.3.3, octet 43", cycle::t_mapc),
     Rule::must("watchdog > T_DP", "Model: an exchange a cycle", cycle::watchdog_outlasts_t_dp).or(&["master.t_dp"]),
-    Rule::must("watchdog = 10 ms x WD_Fact_1 x WD_Fact_2", "Set_Prm octets 2, 3", cycle::watchdog_factors),
+    Rule::must("watchdog = WD_Base x WD_Fact_1 x WD_Fact_2", "Set_Prm octets 2, 3, 8", cycle::watchdog_factors),
 ];
 /// DP services in operation.
 pub static SERVICES: &[Rule] = &[
@@ -100,6 +102,9 @@ pub static SERVICES: &[Rule] = &[
         .or(&["master.t_dp"]),
     Rule::must("Data_Control_Time >= 6 x T_DP", "Model: D5", services::data_control_time),
 ];
+/// Acyclic services.
+pub static ACYCLIC: &[Rule] =
+    &[Rule::warning("octets of a record <= C1_Max_Data_Len, C2_Max_Data_Len", "GSD", services::acyclic_lengths)];
 /// T_I, T_O and the window of every slave.
 pub static INSTANTS: &[Rule] = &[
     Rule::must("T_I = n x T_BASE_IO", "manual 3.3.4, 3.3.5", instants::t_i_grid).clocked(),
@@ -134,7 +139,7 @@ pub static ADVICE: &[Rule] = &[
 ];
 
 /// Every rule.
-pub static ALL: &[&[Rule]] = &[BUS, CYCLE, SERVICES, INSTANTS, TIMERS, JITTER, START_UP, ADVICE];
+pub static ALL: &[&[Rule]] = &[BUS, CYCLE, SERVICES, INSTANTS, TIMERS, JITTER, START_UP, ACYCLIC, ADVICE];
 
 /// What the rules look at.
 #[derive(Clone, Debug)]
@@ -157,10 +162,14 @@ impl<'a> Facts<'a> {
     fn slaves(&self) -> impl Iterator<Item = &'a Slave> {
         self.scenario.configured()
     }
-    /// The devices in the order of their first slaves.
+    /// Those of them that are clocked.
+    fn clocked(&self) -> impl Iterator<Item = &'a Slave> {
+        self.slaves().filter(|slave| self.scenario.is_clocked(slave))
+    }
+    /// The devices of clocked slaves in the order of their first slaves.
     fn devices(&self) -> Vec<&'a Profile> {
         let mut devices: Vec<&'a Profile> = Vec::new();
-        for slave in self.slaves() {
+        for slave in self.clocked() {
             if devices.iter().all(|known| **known != *slave.device) {
                 devices.push(&slave.device);
             }
@@ -284,7 +293,7 @@ fn shortest_t_dp(facts: &Facts<'_>) -> String {
             facts.plan.t_o_min(&slave.device) + gap + slave.times.t_i.max(slave.device.t_i_min(slave.functions));
         facts.plan.t_dp_min(&slave.device).max(times.ceil_to(slave.device.dp_grid()))
     };
-    let shortest = facts.slaves().map(needed).max().unwrap_or_default();
+    let shortest = facts.clocked().map(needed).max().unwrap_or_default();
     format!("the shortest is t_dp = \"{shortest}\"")
 }
 

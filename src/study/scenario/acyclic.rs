@@ -6,8 +6,6 @@ use super::tree::Node;
 use crate::study::quantity::span;
 use crate::time::Span;
 
-/// C1_Response_Timeout and C2_Response_Timeout where nothing else is said (SIEM80F9.GSE).
-pub(super) const RESPONSE_TIMEOUT: Span = Span::from_s(10);
 /// The step of these times in a GSD file.
 const STEP: Span = Span::from_ms(10);
 /// The longest: two octets of steps.

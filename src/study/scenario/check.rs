@@ -46,7 +46,7 @@ impl Stage {
 /// All rules in stages. A stage takes for granted that the stages before found nothing.
 static STAGES: &[Stage] = &[
     Stage::own(&[some_slave, own_addresses, class1::owners, addresses_within_hsa, wiring, crystals, run_length]),
-    Stage::own(&[class2::slaves]),
+    Stage::own(&[class2::slaves, class1::watchdogs, class1::isochronous_required]),
     Stage { own: &[gsd::device_rates], planned: &[rules::BUS] },
     Stage { own: &[], planned: &[rules::CYCLE] },
     Stage { own: &[services::sync_and_freeze], planned: &[rules::SERVICES] },

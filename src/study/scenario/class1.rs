@@ -8,6 +8,7 @@ use super::section::{Reader, Section, instant, number, yes};
 use super::topology::{cable, station_segment};
 use super::{Action, Crystal, IsoTimes, Scenario, Slave, Topology, Watchdog};
 use crate::dp::master::Pace;
+use crate::study::plan::rules::coarse_watchdog;
 use crate::time::Span;
 use crate::wire::Address;
 
@@ -51,9 +52,10 @@ impl Scenario {
     pub fn class1(&self, address: Address) -> Option<&Class1> {
         self.class1.iter().find(|class1| class1.address == address)
     }
-    /// Whether `slave` is clocked: its master sends SYNCH.
+    /// Whether `slave` is clocked: its master sends SYNCH, and the device has isochronous mode. Any other slave gets no
+    /// isochronous block and runs freely, also in a network whose cycle is isochronous.
     pub fn is_clocked(&self, slave: &Slave) -> bool {
-        self.master.pace == Pace::Synch && slave.master == self.master.address
+        self.master.pace == Pace::Synch && slave.master == self.master.address && slave.device.isochronous
     }
 }
 
@@ -69,7 +71,7 @@ pub(super) fn read(mut section: Section<'_>, reader: &mut Reader<'_>, topology: 
     let position_mm = s.optional(reader, "position", cable).unwrap_or(0);
     let crystal = crystal(reader, s);
     let least_cycle = least_cycle(s, reader);
-    let watchdog = s.optional(reader, "watchdog", watchdog).unwrap_or(Some(Watchdog { factor_1: 20, factor_2: 1 }));
+    let watchdog = s.optional(reader, "watchdog", watchdog).unwrap_or(Some(Watchdog::USUAL));
     let get_cfg = s.optional(reader, "get_cfg", yes).unwrap_or(true);
     let dx_retries = s.optional(reader, "dx_retries", number(0..=15)).unwrap_or(1);
     let lost_after = s.optional(reader, "lost_after", number(1..=u32::from(u16::MAX))).unwrap_or(10);
@@ -109,6 +111,30 @@ pub(super) fn pace(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Pace {
         reader.complain(node.place, &section.path_of("least_cycle"), fault);
     }
     Pace::Synch
+}
+/// No slave that works only isochronously has a master without SYNCH.
+pub(super) fn isochronous_required(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let required = |slave: &&Slave| slave.device.isochronous_required && !facts.scenario.is_clocked(slave);
+    for slave in facts.scenario.answering().filter(required) {
+        let fault = Fault::new(format!(
+            "slave {} works only in isochronous mode, and its master {} sends no SYNCH",
+            slave.address, slave.master
+        ))
+        .rule(format!("{} has Isochron_Mode_required (its GSD file)", slave.device.name))
+        .help("an isochronous [master] for it, or another device");
+        about(reader, &format!("slave.{}.master", slave.address), &[&format!("slave.{}.device", slave.address)], fault);
+    }
+}
+/// Complains about isochronous times of a slave whose device has no isochronous mode.
+pub(super) fn refuse_times_of_device(section: &Section<'_>, reader: &mut Reader<'_>) {
+    for key in ["t_i", "t_o", "t_pll_w", "t_pll_d"] {
+        if let Some(node) = section.node(key) {
+            let fault = Fault::new("this device has no isochronous mode, and so no such time")
+                .rule("a device without Isochron_Mode_supp gets no isochronous block (its GSD file)")
+                .help("leave it out");
+            reader.complain(node.place, &section.path_of(key), fault);
+        }
+    }
 }
 /// Complains about isochronous times of a slave that is not clocked.
 pub(super) fn refuse_times(section: &Section<'_>, reader: &mut Reader<'_>) {
@@ -155,6 +181,18 @@ pub(super) fn event_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
             let path = format!("event.{}", i + 1);
             let others = [format!("{path}.slave"), format!("{path}.slaves")];
             about(reader, &format!("{path}.station"), &[&others[0], &others[1]], fault);
+        }
+    }
+}
+
+/// The watchdog of a further master has steps that its slaves have.
+pub(super) fn watchdogs(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    for (i, class1) in facts.scenario.class1.iter().enumerate() {
+        let Some(watchdog) = class1.watchdog.filter(|watchdog| watchdog.base_1ms) else { continue };
+        let coarse = facts.scenario.slaves_of(class1.address).find(|slave| !slave.device.wd_base_1ms);
+        if let Some(slave) = coarse {
+            let fault = coarse_watchdog(watchdog.span(), slave);
+            about(reader, &format!("class1.{}.watchdog", i + 1), &[], fault);
         }
     }
 }

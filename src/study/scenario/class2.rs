@@ -32,8 +32,8 @@ pub struct Class2 {
     pub powered_at: Span,
     /// Send_Timeout of its connections, a multiple of 10 ms; none is the shortest of the bit rate (VPC3+ driver).
     pub send_timeout: Option<Span>,
-    /// C2_Response_Timeout, a multiple of 10 ms (GSD).
-    pub response_timeout: Span,
+    /// When a request is given up, a multiple of 10 ms; none is each slave's C2_Response_Timeout (GSD).
+    pub response_timeout: Option<Span>,
     /// Messages in one token visit at most. Model: default 1.
     pub per_token: u8,
     /// What it does, in the order of the file.
@@ -90,8 +90,7 @@ pub(super) fn read(
     let crystal = read::crystal(reader, s);
     let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
     let send_timeout = s.optional(reader, "send_timeout", acyclic::timeout);
-    let response_timeout =
-        s.optional(reader, "response_timeout", acyclic::timeout).unwrap_or(acyclic::RESPONSE_TIMEOUT);
+    let response_timeout = s.optional(reader, "response_timeout", acyclic::timeout);
     let per_token = s.optional(reader, "per_token", number(1..=u8::MAX)).unwrap_or(1);
     let jobs = s.tables(reader, "job").into_iter().filter_map(|inner| job(inner, reader, all)).collect();
     section.finish(reader);

@@ -753,7 +753,7 @@ fn overrides_that_break_a_rule() {
             "2570 ms",
             r#"
 --set "master.watchdog=2570 ms": master.watchdog: no watchdog runs for 2.57 s
-  rule: a watchdog is 10 ms x WD_Fact_1 x WD_Fact_2 with factors from 1 to 255 (Set_Prm octets 2 and 3)
+  rule: a watchdog is 10 ms x WD_Fact_1 x WD_Fact_2 with factors from 1 to 255 (Set_Prm octets 2 and 3), or 1 ms x both with WD_Base_1ms_supp (octet 8)
   help: the nearest are "2.56 s" and "2.58 s", and "0 ms" is off
 "#,
         ),

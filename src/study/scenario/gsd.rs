@@ -6,6 +6,7 @@ use super::section::{Reader, Section, choice, text};
 use super::tree::{Node, Value};
 use super::{Action, CodeSequence, Scaling, Slave};
 use crate::device::profile::{Device, PROFILES};
+use crate::device::tool::Work;
 use crate::study::build;
 use crate::study::gsd::{Gsd, Touched, UserPrm};
 use crate::time::BitRate;
@@ -236,6 +237,23 @@ pub(super) fn acyclic_devices(facts: &Facts<'_>, reader: &mut Reader<'_>) {
                 .rule(format!("{} has no C1_Read_Write_supp (its GSD file)", slave.device.name));
             let path = format!("event.{}", i + 1);
             about(reader, &format!("{path}.slave"), &[&format!("{path}.slaves")], fault);
+        }
+    }
+    for (i, class2) in facts.scenario.class2.iter().enumerate() {
+        for (j, job) in class2.jobs.iter().enumerate() {
+            // Every slave answers the reading services of DP-V0.
+            if job.works.iter().all(|work| matches!(work, Work::Read(_))) {
+                continue;
+            }
+            let slaves = job.slaves.iter().filter_map(|&address| facts.scenario.slave(address));
+            let without = |slave: &&Slave| slave.device.ms2_connections == 0 && slave.options.ms2_connections.is_none();
+            if let Some(slave) = slaves.into_iter().find(without) {
+                let fault = Fault::new(format!("slave {} takes no acyclic requests of class 2 masters", slave.address))
+                    .rule(format!("{} has no C2_Read_Write_supp (its GSD file)", slave.device.name))
+                    .help("ms2_connections of the slave gives it some all the same");
+                let path = format!("class2.{}.job.{}", i + 1, j + 1);
+                about(reader, &format!("{path}.slave"), &[&format!("{path}.slaves")], fault);
+            }
         }
     }
 }

@@ -4,6 +4,7 @@ use super::error::Fault;
 use super::section::{Reader, Section, choice, cycle_time, number, quantity, yes};
 use super::tree::Node;
 use crate::device::options::{LifeOptions, LifeStart, PllOptions, Resolution, UnitOptions};
+use crate::device::profile::MOST_MS2_CONNECTIONS;
 use crate::device::sensor::{Acknowledgement, ErrorBit, SensorOptions, ValueBit};
 use crate::study::quantity::gain;
 use crate::time::{BitRate, Span};
@@ -40,7 +41,7 @@ pub(super) fn read(section: &mut Section<'_>, reader: &mut Reader<'_>, rate: Bit
     let sensor = section.table(reader, "sensor").map(|inner| sensor(inner, reader));
     let preset_value = section.optional(reader, "preset_value", number(i32::MIN..=i32::MAX));
     let resolution = section.table(reader, "resolution").and_then(|inner| resolution(inner, reader));
-    let ms2_connections = section.optional(reader, "ms2_connections", number(0..=49));
+    let ms2_connections = section.optional(reader, "ms2_connections", number(0..=MOST_MS2_CONNECTIONS));
     UnitOptions {
         clock_tolerance: clock_tolerance.unwrap_or(usual.clock_tolerance),
         pll: pll.unwrap_or(usual.pll),
@@ -52,7 +53,7 @@ pub(super) fn read(section: &mut Section<'_>, reader: &mut Reader<'_>, rate: Bit
         sensor: sensor.unwrap_or(usual.sensor),
         preset_value: preset_value.unwrap_or(usual.preset_value),
         resolution,
-        ms2_connections: ms2_connections.unwrap_or(usual.ms2_connections),
+        ms2_connections,
     }
 }
 

@@ -260,7 +260,8 @@ fn entry<'t>(root: &'t mut Table, name: &str, index: &str) -> Option<&'t mut Tab
 /// Keys of which one takes the other's place when it is overridden.
 const INSTEAD: [(&str, &str); 3] = [("duration", "cycles"), ("at", "cycle"), ("slave", "slaves")];
 
-/// Puts `node` at `path` under `table`; what is not a table on the way becomes one.
+/// Puts `node` at `path` under `table`; what is neither table nor list on the way becomes a table. Entries of lists are
+/// counted from 1.
 fn put(table: &mut Table, path: &[&str], node: &Node) -> Result<(), Fault> {
     match path {
         [] | [""] => Err(Fault::new("an override names a key").help("for example slave.3.crystal=20 ppm")),
@@ -276,12 +277,37 @@ fn put(table: &mut Table, path: &[&str], node: &Node) -> Result<(), Fault> {
         [key, rest @ ..] => {
             let empty = || Node { place: node.place, value: Value::Table(Table::default()) };
             let (_, inner) = table.0.entry((*key).to_owned()).or_insert_with(|| (node.place, empty()));
-            if !matches!(inner.value, Value::Table(_)) {
+            if !matches!(inner.value, Value::Table(_) | Value::List(_)) {
                 *inner = empty();
             }
-            let Value::Table(inner) = &mut inner.value else { return Ok(()) };
-            put(inner, rest, node)
+            match &mut inner.value {
+                Value::Table(inner) => put(inner, rest, node),
+                Value::List(items) => put_in_list(key, items, rest, node),
+                _ => Ok(()),
+            }
         }
+    }
+}
+/// Puts `node` at `path`, which begins with a number, into the list `key`.
+fn put_in_list(key: &str, items: &mut [Node], path: &[&str], node: &Node) -> Result<(), Fault> {
+    let [index, rest @ ..] = path else { return Ok(()) };
+    let help = match items.len() {
+        0 => "the list is empty".to_owned(),
+        1 => format!("it has one: {key}.1"),
+        count => format!("it has {key}.1 to {key}.{count}"),
+    };
+    let number = index.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+    let Some(item) = number.and_then(|number| items.get_mut(number)) else {
+        return Err(Fault::new(format!("the list {key} has no number \"{index}\"")).help(help));
+    };
+    match (&mut item.value, rest) {
+        (Value::Table(table), rest) => put(table, rest, node),
+        (Value::List(items), [_, ..]) => put_in_list(index, items, rest, node),
+        (_, []) => {
+            *item = node.clone();
+            Ok(())
+        }
+        (_, [key, ..]) => Err(Fault::new(format!("entry {index} of the list has no keys, and so no \"{key}\""))),
     }
 }
 
@@ -350,7 +376,7 @@ fn master(
     };
     let t_mapc = s.optional(reader, "t_mapc", number(0..=u8::MAX)).unwrap_or(1);
     let times = Times::read(reader, s, rate);
-    let watchdog = s.optional(reader, "watchdog", watchdog).unwrap_or(Some(Watchdog { factor_1: 20, factor_2: 1 }));
+    let watchdog = s.optional(reader, "watchdog", watchdog).unwrap_or(Some(Watchdog::USUAL));
     let get_cfg = s.optional(reader, "get_cfg", yes).unwrap_or(true);
     let dx_retries = s.optional(reader, "dx_retries", number(0..=15)).unwrap_or(1);
     let lost_after = s.optional(reader, "lost_after", number(1..=u32::from(u16::MAX))).unwrap_or(10);
@@ -364,7 +390,7 @@ fn master(
     let life_start = s.optional(reader, "life_start", number(1..=15)).unwrap_or(1);
     let life_delay = s.optional(reader, "life_delay", number(0..=u32::MAX)).unwrap_or(0);
     let active_spare = s.optional(reader, "active_spare", yes).unwrap_or(false);
-    let ms1_timeout = s.optional(reader, "ms1_timeout", acyclic::timeout).unwrap_or(acyclic::RESPONSE_TIMEOUT);
+    let ms1_timeout = s.optional(reader, "ms1_timeout", acyclic::timeout);
     let services = services::master(s, reader);
     section.finish(reader);
     let (address, t_dp) = (address?, t_dp?);
@@ -428,13 +454,18 @@ pub(super) fn watchdog(node: &Node) -> Result<Option<Watchdog>, Fault> {
         return Ok(None);
     }
     Watchdog::of(wanted).map(Some).ok_or_else(|| {
-        let steps = wanted.div_floor(Watchdog::BASE).clamp(0, 255 * 255);
-        let of = |steps: i64| Watchdog::of(Watchdog::BASE * steps).map(|watchdog| format!("\"{}\"", watchdog.span()));
+        let fine = !wanted.is_multiple_of(Watchdog::BASE) && wanted < Watchdog::BASE_1MS * (255 * 255);
+        let step = if fine { Watchdog::BASE_1MS } else { Watchdog::BASE };
+        let steps = wanted.div_floor(step).clamp(0, 255 * 255);
+        let of = |steps: i64| Watchdog::of(step * steps).map(|watchdog| format!("\"{}\"", watchdog.span()));
         let below = (0..=steps).rev().find_map(of);
         let above = (steps + 1..=255 * 255).find_map(of);
         let nearest: Vec<_> = below.into_iter().chain(above).collect();
         Fault::new(format!("no watchdog runs for {wanted}"))
-            .rule("a watchdog is 10 ms x WD_Fact_1 x WD_Fact_2 with factors from 1 to 255 (Set_Prm octets 2 and 3)")
+            .rule(
+                "a watchdog is 10 ms x WD_Fact_1 x WD_Fact_2 with factors from 1 to 255 (Set_Prm octets 2 and 3), or 1 ms x \
+                 both with WD_Base_1ms_supp (octet 8)",
+            )
             .help(format!("the nearest are {}, and \"0 ms\" is off", nearest.join(" and ")))
     })
 }
@@ -478,8 +509,11 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let own = Times::read(reader, s, rate);
     let master = s.optional(reader, "master", address).or(context.master.map(|master| master.address));
     let clocked = context.master.is_none_or(|own| own.pace == Pace::Synch && master == Some(own.address));
+    let isochronous = kind.as_ref().is_none_or(|kind| kind.device.isochronous);
     if !clocked {
         class1::refuse_times(s, reader);
+    } else if !isochronous {
+        class1::refuse_times_of_device(s, reader);
     }
     let standstill = Motion::Standstill { at: Angle::ZERO };
     let motion = match s.table(reader, "motion") {
@@ -498,7 +532,7 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
     let user_prm = gsd::user_prm(kind.as_ref(), s, reader);
     let services = services::slave(s, reader);
     section.finish(reader);
-    let times = if clocked {
+    let times = if clocked && isochronous {
         iso_times(reader, from, own.or(context.times), context.times.is_some())
     } else {
         Some(class1::UNCLOCKED)

@@ -28,7 +28,7 @@ pub(super) fn isochronous_rate(facts: &Facts<'_>, found: &mut Findings) {
 
 /// A narrower window is raised silently.
 pub(super) fn window_is_taken(facts: &Facts<'_>, found: &mut Findings) {
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         let (t_pll_w, least) = (slave.times.t_pll_w, slave.options.pll.min_window.max(slave.device.min_window));
         let key = Key::slave(slave.address, "t_pll_w");
         found.check(key, t_pll_w, Relation::AtLeast, ("the device's narrowest", least), || {
@@ -42,7 +42,7 @@ pub(super) fn window_is_taken(facts: &Facts<'_>, found: &mut Findings) {
 /// One SYNCH may be early and the next late: the loop follows the mean of both.
 pub(super) fn jitter_within_window(facts: &Facts<'_>, found: &mut Findings) {
     let Some((stray, words)) = stray(facts.scenario.master.gc_jitter) else { return };
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         let (t_pll_w, twice) = (slave.times.t_pll_w, stray * 2);
         let key = Key::slave(slave.address, "t_pll_w");
         found.check(key, t_pll_w, Relation::AtLeast, ("2 x jitter of SYNCH", twice), || {
@@ -104,7 +104,7 @@ pub(super) fn drive_instants(facts: &Facts<'_>, found: &mut Findings) {
 /// T_DP is so many steps longer than T_I + T_O or T_DX of every drive, whichever `of` takes.
 fn drive(facts: &Facts<'_>, found: &mut Findings, of: fn(Span, Span) -> Span, terms: &str, steps: i64) {
     let t_dp = facts.scenario.master.t_dp;
-    for slave in facts.slaves().filter(|slave| slave.device.subscriber) {
+    for slave in facts.clocked().filter(|slave| slave.device.subscriber) {
         let needed = of(slave.times.t_i + slave.times.t_o, facts.plan.t_dx) + slave.device.io_grid() * steps;
         found.check(Key::master("t_dp"), t_dp, Relation::AtLeast, (terms, needed), || {
             Fault::new(format!("T_DP = {t_dp} is short for drive {}", slave.address))

@@ -4,7 +4,7 @@ use super::{Facts, Findings, neighbours, shortest_t_dp, stray};
 use crate::study::build;
 use crate::study::plan::Plan;
 use crate::study::plan::finding::{Amount, Key, Relation};
-use crate::study::scenario::{Fault, Watchdog};
+use crate::study::scenario::{Fault, Slave, Watchdog};
 use crate::time::Span;
 use crate::wire::prm::IsoM;
 
@@ -110,12 +110,31 @@ pub(super) fn watchdog_outlasts_t_dp(facts: &Facts<'_>, found: &mut Findings) {
     });
 }
 
-/// Reading the key has refused everything else.
+/// The factors: reading the key has refused everything else. Steps of 1 ms are for slaves that have them.
 pub(super) fn watchdog_factors(facts: &Facts<'_>, found: &mut Findings) {
-    let Some(watchdog) = facts.scenario.master.watchdog.map(Watchdog::span) else { return };
-    let key = Key::master("watchdog");
-    found.silent(key, watchdog, Relation::MultipleOf, ("10 ms", Watchdog::BASE));
-    found.silent(key, watchdog, Relation::AtMost, ("10 ms x 255 x 255", Watchdog::MAX));
+    let Some(watchdog) = facts.scenario.master.watchdog else { return };
+    let (key, span) = (Key::master("watchdog"), watchdog.span());
+    let (step, longest) = if watchdog.base_1ms { ("1 ms", "1 ms x 255 x 255") } else { ("10 ms", "10 ms x 255 x 255") };
+    found.silent(key, span, Relation::MultipleOf, (step, watchdog.base()));
+    found.silent(key, span, Relation::AtMost, (longest, watchdog.base() * (255 * 255)));
+    if !watchdog.base_1ms {
+        return;
+    }
+    for slave in facts.slaves().filter(|slave| !slave.device.wd_base_1ms) {
+        let terms = format!("10 ms, slave {} has no WD_Base_1ms_supp", slave.address);
+        found.check(key, span, Relation::MultipleOf, (terms, Watchdog::BASE), || coarse_watchdog(span, slave));
+    }
+}
+/// The fault of a watchdog in steps of 1 ms for a slave that does not have them.
+pub(in crate::study) fn coarse_watchdog(span: Span, slave: &Slave) -> Fault {
+    let above = (span.div_floor(Watchdog::BASE) + 1..).find_map(|steps| Watchdog::of(Watchdog::BASE * steps));
+    let help = above.map_or_else(String::new, |above| format!("the next is watchdog = \"{}\"", above.span()));
+    Fault::new(format!("a watchdog of {span} is too fine for slave {}", slave.address))
+        .rule(format!(
+            "the watchdog is a multiple of 10 ms where a slave has no WD_Base_1ms_supp, such as {} (its GSD file)",
+            slave.device.name
+        ))
+        .help(help)
 }
 
 pub(super) fn jitter_fits(facts: &Facts<'_>, found: &mut Findings) {

@@ -6,13 +6,13 @@ use crate::study::scenario::{Fault, Slave};
 use crate::time::Span;
 
 pub(super) fn t_i_grid(facts: &Facts<'_>, found: &mut Findings) {
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         grid(found, slave, ("t_i", slave.times.t_i), "3.3.4, 3.3.5");
     }
 }
 
 pub(super) fn t_o_grid(facts: &Facts<'_>, found: &mut Findings) {
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         grid(found, slave, ("t_o", slave.times.t_o), "3.3.4, 3.3.6");
     }
 }
@@ -28,7 +28,7 @@ fn grid(found: &mut Findings, slave: &Slave, (key, span): (&'static str, Span), 
 }
 
 pub(super) fn t_i_minimum(facts: &Facts<'_>, found: &mut Findings) {
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         let (t_i, min) = (slave.times.t_i, slave.device.t_i_min(slave.functions));
         let key = Key::slave(slave.address, "t_i");
         found.check(key, t_i, Relation::AtLeast, (format!("TI_MIN, octet 15 bit 1 {}", on_off(slave)), min), || {
@@ -45,7 +45,7 @@ pub(super) fn t_i_minimum(facts: &Facts<'_>, found: &mut Findings) {
 
 pub(super) fn t_o_minimum(facts: &Facts<'_>, found: &mut Findings) {
     let t_dx = facts.plan.t_dx_told();
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         let (t_o, t_o_min) = (slave.times.t_o, slave.device.t_o_min);
         let bound = t_dx + t_o_min;
         found.check(Key::slave(slave.address, "t_o"), t_o, Relation::MoreThan, ("T_DX + T_O_MIN", bound), || {
@@ -59,7 +59,7 @@ pub(super) fn t_o_minimum(facts: &Facts<'_>, found: &mut Findings) {
 /// The gap rule; since T_I is above 0 it holds T_O below T_DP too.
 pub(super) fn t_o_maximum(facts: &Facts<'_>, found: &mut Findings) {
     let t_dp = facts.scenario.master.t_dp;
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         let (times, gap_min) = (slave.times, slave.device.gap_min(slave.functions));
         let bound = t_dp - times.t_i - gap_min;
         found.check(Key::slave(slave.address, "t_o"), times.t_o, Relation::AtMost, ("T_DP - T_I - gap", bound), || {
@@ -96,7 +96,7 @@ fn too_late(facts: &Facts<'_>, slave: &Slave) -> Fault {
 
 /// The gap rule says it if not.
 pub(super) fn t_o_within(facts: &Facts<'_>, found: &mut Findings) {
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         let bound = ("T_DP", facts.scenario.master.t_dp);
         found.silent(Key::slave(slave.address, "t_o"), slave.times.t_o, Relation::LessThan, bound);
     }
@@ -104,14 +104,14 @@ pub(super) fn t_o_within(facts: &Facts<'_>, found: &mut Findings) {
 
 /// The gap rule says it if not.
 pub(super) fn t_i_within(facts: &Facts<'_>, found: &mut Findings) {
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         let bound = ("T_DP", facts.scenario.master.t_dp);
         found.silent(Key::slave(slave.address, "t_i"), slave.times.t_i, Relation::LessThan, bound);
     }
 }
 
 pub(super) fn window(facts: &Facts<'_>, found: &mut Findings) {
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         let max = Span::from_iso_units(u32::from(slave.device.t_pll_w_max));
         let range = (Span::from_iso_units(1), max);
         iso_units(found, slave, ("t_pll_w", slave.times.t_pll_w), range, ("T_PLL_W_MAX", "3.3.8"));
@@ -119,7 +119,7 @@ pub(super) fn window(facts: &Facts<'_>, found: &mut Findings) {
 }
 
 pub(super) fn delay(facts: &Facts<'_>, found: &mut Findings) {
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         // The delayed latch must lie before the next clock, which may come a window early.
         let window = slave.times.t_pll_w.max(slave.options.pll.min_window);
         let before_clock = (slave.times.t_i - window - Span::from_iso_units(1)).max(Span::ZERO);
@@ -158,7 +158,7 @@ fn iso_units(
 /// The narrowest window is one that may be.
 pub(super) fn least_window(facts: &Facts<'_>, found: &mut Findings) {
     let widest = Span::from_ticks(facts.scenario.master.t_dp.ticks() / 4);
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         let least = slave.options.pll.min_window;
         let key = Key::slave(slave.address, "pll.min_window");
         found.check(key, least, Relation::AtMost, ("T_DP / 4", widest), || {
@@ -171,7 +171,7 @@ pub(super) fn least_window(facts: &Facts<'_>, found: &mut Findings) {
 
 /// A timer whose steps are longer than the window cannot hit it.
 pub(super) fn quantum(facts: &Facts<'_>, found: &mut Findings) {
-    for slave in facts.slaves() {
+    for slave in facts.clocked() {
         let (pll, quantum) = (slave.options.pll, slave.options.pll.quantum);
         let window = slave.times.t_pll_w.max(pll.min_window);
         let key = Key::slave(slave.address, "pll.quantum");

@@ -1,8 +1,11 @@
 //! Rules of DP services in operation.
 
 use super::{Facts, Findings};
+use crate::device::parameters::PARAMETERS;
+use crate::device::tool::Work;
 use crate::study::plan::finding::{Key, Relation};
-use crate::study::scenario::Fault;
+use crate::study::scenario::{Action, Fault, Scenario, Slave};
+use crate::wire::parameter::Format;
 
 /// Shortest Data_Control_Time in cycles. Model: D5, its third is two cycles or more, since not every cycle has time to
 /// tell the mode.
@@ -38,4 +41,63 @@ pub(super) fn data_control_time(facts: &Facts<'_>, found: &mut Findings) {
             ))
             .help(format!("data_control_time = \"{least}\" or more"))
     });
+}
+
+/// Octets of the header of the parameter channel's requests and answers, and of the address of a parameter.
+const HEAD: usize = 4;
+const ADDRESS: usize = 6;
+/// What a read asks for that wants all there is (C2_Max_Data_Len at most).
+const ALL_OF_IT: usize = 240;
+
+/// Octets of values in the parameter channel: format, number, the values and what makes their number even.
+fn values(format: Format, count: usize) -> usize {
+    2 + (format.size() * count).next_multiple_of(2)
+}
+/// The longer of a read request and its answer, as far as the parameter is known.
+fn reading(pnu: u16, elements: u8) -> usize {
+    let known = PARAMETERS.iter().find(|known| known.pnu == pnu);
+    let answer = known.map_or(0, |known| HEAD + values(known.format, elements.max(1).into()));
+    answer.max(HEAD + ADDRESS)
+}
+
+/// The longest data that `[master]` writes to and reads from this slave.
+fn longest_of_class_1(scenario: &Scenario, slave: &Slave) -> Option<usize> {
+    let events = scenario.events.iter().filter(|event| event.slaves.contains(&slave.address));
+    let octets = events.filter_map(|event| match event.action {
+        Action::ReadParameter { parameter, elements, .. } => Some(reading(parameter, elements)),
+        Action::ChangeParameter { format, .. } => Some(HEAD + ADDRESS + values(format, 1)),
+        _ => None,
+    });
+    octets.max()
+}
+/// The longest data that class 2 masters write to and read from this slave.
+fn longest_of_class_2(scenario: &Scenario, slave: &Slave) -> Option<usize> {
+    let jobs = scenario.class2.iter().flat_map(|class2| &class2.jobs).filter(|job| job.slaves.contains(&slave.address));
+    let octets = jobs.flat_map(|job| &job.works).filter_map(|work| match work {
+        Work::Parameter(address) => Some(reading(address.pnu, address.elements)),
+        Work::ReadRecord(_, length) => Some(usize::from(*length)).filter(|&length| length != ALL_OF_IT),
+        Work::WriteRecord(_, data) => Some(data.len()),
+        Work::Read(_) => None,
+    });
+    octets.max()
+}
+
+/// No acyclic request and no answer to one is longer than the slave takes: it refuses what is.
+pub(super) fn acyclic_lengths(facts: &Facts<'_>, found: &mut Findings) {
+    for slave in facts.scenario.answering() {
+        let device = &slave.device;
+        for (class, longest, most) in [
+            ("C1_Max_Data_Len", longest_of_class_1(facts.scenario, slave), device.c1.max_data),
+            ("C2_Max_Data_Len", longest_of_class_2(facts.scenario, slave), device.c2.max_data),
+        ] {
+            let Some(octets) = longest else { continue };
+            let key = Key::slave(slave.address, "device");
+            found.check(key, octets as u32, Relation::AtMost, (class, u32::from(most)), || {
+                Fault::new(format!("slave {} refuses an acyclic request or answer of {octets} octets", slave.address))
+                    .rule(format!("records of {} have up to {most} octets (GSD: {class})", device.name))
+                    .help("ask for fewer elements, or for a shorter record")
+            });
+            found.of("octets of the longest record", None);
+        }
+    }
 }
