@@ -231,6 +231,7 @@ pub fn layout(scenario: &Scenario) -> Layout {
 
 fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
     PlotMeta {
+        cycle: scenario.cycle_symbol(),
         scenario: scenario.name.clone(),
         seed: scenario.run.seed,
         t_dp: scenario.master.t_dp,
