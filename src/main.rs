@@ -99,6 +99,9 @@ struct PlanArgs {
     /// Shows, as a scenario, times that keep all rules with the shortest T_DP, and nothing else.
     #[arg(long, conflicts_with = "slave")]
     propose: bool,
+    /// Shows every rule on the page, not only those that are broken or tight.
+    #[arg(long, conflicts_with_all = ["propose", "slave"])]
+    rules: bool,
     /// Shows Set_Prm and Chk_Cfg of this slave octet by octet, and nothing else.
     #[arg(long, value_name = "N")]
     slave: Option<u8>,
@@ -197,8 +200,8 @@ fn run_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
 }
 
 fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
-    let PlanArgs { scenario: file, out, sets, propose, slave } = args;
-    let answer = answer(&Call { file, sets, propose, slave, out })?;
+    let PlanArgs { scenario: file, out, sets, propose, rules, slave } = args;
+    let answer = answer(&Call { file, sets, propose, rules, slave, out })?;
     let code = if answer.violated { ExitCode::from(VIOLATED) } else { ExitCode::SUCCESS };
     Ok((answer.page, code))
 }

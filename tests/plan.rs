@@ -269,7 +269,10 @@ proptest! {
         for plan in [Plan::of(&scenario), Plan::expected(&scenario)] {
             let cycles: Span = plan.slots.iter().map(|slot| slot.t_mc(bus)).sum();
             prop_assert_eq!(plan.t_dx, bus.span(bus.t_id2()) + cycles - bus.span(bus.t_id1()));
-            prop_assert_eq!(plan.free_running(bus).cycle, cycles + bus.span(plan::TOKEN + bus.t_id1()));
+            let free = plan.free_running(&scenario);
+            prop_assert_eq!(free.busy(), cycles + bus.span(plan::TOKEN + bus.t_id1()));
+            prop_assert_eq!(free.cycle(), free.busy().max(free.least()));
+            prop_assert_eq!(free.gap, plan.gap);
             for slot in &plan.slots {
                 let slave = scenario.slave(slot.slave).expect("a slave");
                 let (outputs, inputs) = (usize::from(slave.device.outputs), usize::from(slave.device.inputs));
@@ -381,6 +384,42 @@ proptest! {
             prop_assert_eq!(reply, (slot.reply, slot.reply_end, slot.slave));
         }
     }
+    /// The rule behind V1 and V4, free-running: the cycle of a run is the sum of the message cycles and the token, at every
+    /// G-th visit with a GAP poll, and no shorter than the master and the slaves allow.
+    #[test]
+    fn a_free_running_cycle_is_planned_to_the_bit(
+        net in net(CABLE_RATES),
+        least in prop_oneof![Just(0u32), 0u32..20_000],
+        interval in prop_oneof![Just(None), (1u32..3_000).prop_map(Some)],
+    ) {
+        let scenario = free(&net, least, interval);
+        let (run, plan, bus) = (Run::of(&scenario), Plan::expected(&scenario), &scenario.bus.params);
+        let free = plan.free_running(&scenario);
+        let started = start(&run);
+        prop_assert!(started + 20 < 400, "started in cycle {started}");
+        let mut polls = Vec::new();
+        for pair in run.cycles.windows(2).filter(|pair| pair[0].cycle > started && pair[0].t_dx.is_some()) {
+            let cycle = pair[0].cycle;
+            prop_assert_eq!(pair[0].t_dx, Some(plan.t_dx), "cycle {}", cycle);
+            if has_message(&run, cycle) {
+                continue;
+            }
+            let mode = if has_mode(&run, cycle) { plan.mode(bus) } else { Span::ZERO };
+            let gap = match polled(&run, cycle).map(|(address, _)| plan.slot(address)) {
+                None => Span::ZERO,
+                Some(None) => free.gap,
+                Some(Some(slot)) => {
+                    bus.span(bus.t_id1() + plan::STATUS_REQUEST + slot.t_sdr + plan::STATUS_REQUEST) + slot.t_td_both
+                }
+            };
+            polls.extend((gap > Span::ZERO).then_some(cycle));
+            prop_assert_eq!(pair[1].t0 - pair[0].t0, free.cycle_with(mode + gap), "cycle {}", cycle);
+        }
+        prop_assert!(polls.len() > 1, "GAP polls were seen");
+        for pair in polls.windows(2) {
+            prop_assert!((pair[1] - pair[0]).is_multiple_of(net.gap_factor.into()), "every G-th visit: {:?}", pair);
+        }
+    }
     /// A run of a proposal starts up without a fault.
     #[test]
     fn a_proposal_starts_up_without_a_fault(net in net(FAST)) {
@@ -396,6 +435,23 @@ proptest! {
             prop_assert_eq!(slave.fault_count(), 0, "slave {}", slave.address);
         }
     }
+}
+
+/// The network without SYNCH, with a least cycle time (us) and Min_Slave_Interval (us) of every slave.
+fn free(net: &Net, least: u32, interval: Option<u32>) -> Scenario {
+    let net = Net { jitter_ns: 0, ..net.clone() };
+    let text = net.text(
+        "1 ms",
+        "0 us",
+        "0 us",
+        &format!("isochronous = false\nleast_cycle = \"{least} us\"\nwatchdog = \"60 s\"\n"),
+    );
+    let clocked = ["t_dp", "t_i", "t_o", "active_spare", "gc_jitter"];
+    let interval = interval.map_or_else(String::new, |us| format!("min_slave_interval = \"{us} us\"\n"));
+    let lines = text.lines().filter(|line| clocked.iter().all(|key| line.split(' ').next() != Some(key)));
+    let text: String = lines.flat_map(|line| [line, "\n"]).collect();
+    let text = text.replace("[[slave]]\n", &format!("[[slave]]\n{interval}"));
+    Scenario::parse("free", "free.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
 /// The cycle in which the last slave entered data exchange.
@@ -636,7 +692,8 @@ fn every_rule_finds_something() {
                  \"subscriber-drive\"\n[[link]]\npublisher = 6\nsubscriber = 9\n\
                  [[event]]\ncycle = 0\ndo = \"read-parameter\"\nparameter = 918\nslave = 6\n";
     let jitter = "data_control_time = \"1 s\"\ngc_jitter = { kind = \"normal\", sigma = \"10 ns\" }\n[[slave]]";
-    let scenario = to_plan(&[&THREE.replacen("[[slave]]", jitter, 1), drive].concat());
+    let other = "[[class1]]\naddress = 10\n";
+    let scenario = to_plan(&[&THREE.replacen("[[slave]]", jitter, 1), drive, other].concat());
     let facts = Facts::of(&scenario);
     for rule in rules::ALL.iter().copied().flatten() {
         let found = rule.findings(&facts);
@@ -651,14 +708,15 @@ fn a_page_shows_the_cycle_its_shares_and_its_instants() {
     let page = call(&Room::new(), THREE, &[]).1;
     let expected = "\
 three: master 2, 3 slaves, 0 links, 12 Mbit/s, cable 0 m
-T_DP 2 ms, its content needs 500 us   T_DX 222.833 us at most (MaxTsdr), 180.333 us expected (own T_SDR)
+T_DP 2 ms, its content needs 500 us
+T_DX 222.833 us at most (MaxTsdr), 180.333 us expected (own T_SDR)
 T_ID1 76 tbit   T_ID2 800 tbit   T_SL 1000 tbit   bit 83.333 ns
 
-Data_Exchange at the longest, from t0 (last bit of SYNCH); T_S to T_ID1 in tbit
-slave  device                     T_S  T_SDR  T_R  2 T_TD  T_ID1  T_MC tbit  T_MC us  request us  reply ends us
-6      simodrive-sensor-isochron  143    200  231       0     76        650   54.167      66.667        114.500
-7      simodrive-sensor-isochron  143    200  231       0     76        650   54.167     120.833        168.667
-8      simodrive-sensor-isochron  143    200  231       0     76        650   54.167     175.000        222.833
+Data_Exchange at the longest, from t0 (last bit of SYNCH) on; T_S to 2 T_TD in tbit
+slave  device                     T_S  T_SDR  T_R  2 T_TD  T_MC us  start us   end us
+6      simodrive-sensor-isochron  143    200  231       0   54.167    66.667  114.500
+7      simodrive-sensor-isochron  143    200  231       0   54.167   120.833  168.667
+8      simodrive-sensor-isochron  143    200  231       0   54.167   175.000  222.833
 
 share of the cycle                    tbit        us  of T_DP
 T_DX: T_ID2 and every Data_Exchange   2674   222.833   11.1 %
@@ -670,12 +728,12 @@ T_DP                                 24000  2000.000  100.0 %
 
 slave     T_I           allowed     T_O            allowed  T_PLL_W        allowed  dead time
 6..8   125 us  125 us .. 1.5 ms  375 us  375 us .. 1.75 ms     1 us  1 us .. 20 us     2.5 ms
-T_M 222.833 us: the master application may compute from then on, for 1.777 ms (T_MAPC 1 x T_DP - T_DX)
-dead time = T_I + T_MAPC x T_DP + T_O: latch, data in the next cycle, compute, set point in the cycle after
+T_M 222.833 us: the master application may compute from then on, for 1.777 ms (T_MAPC 1)
+dead time = T_I + T_MAPC x T_DP + T_O: latch, data a cycle later, compute, set point the cycle after
 
-                   O                                                                          I
-|...DDDddDDDGGGGGt..................................................................................S|
-0                                                                                                 2 ms
+                   O                                                                        I
+|...DDdddDDDGGGGtt................................................................................S|
+0                                                                                               2 ms
 ";
     assert!(page.starts_with(expected), "\n{page}");
 }
@@ -686,8 +744,11 @@ fn a_page_of_many_slaves_fits() {
     let many = THREE.replace("6..8", "3..33").replace("2 ms", "16 ms").replace("375 us", "12 ms");
     for scenario in [THREE.to_owned(), many.clone(), many.replace("16 ms", "1 ms")] {
         let page = call(&Room::new(), &scenario, &[]).1;
-        assert!(page.lines().count() <= 95, "{page}");
-        assert!(page.lines().all(|line| line.chars().count() <= 140), "{page}");
+        assert!(page.lines().count() <= 60, "{page}");
+        assert!(page.lines().all(|line| line.chars().count() <= 100), "{page}");
+        let every = call(&Room::new(), &scenario, &["--rules"]).1;
+        assert!(every.lines().count() > page.lines().count() + 20, "{every}");
+        assert!(every.lines().all(|line| line.chars().count() <= 100), "{every}");
     }
     let page = call(&Room::new(), &many, &[]).1;
     assert!(page.contains("\n3..33  simodrive-sensor-isochron  143    200  231"), "{page}");
@@ -709,4 +770,78 @@ fn a_network_of_segments_is_planned_to_the_tick_and_proposed() {
         Scenario::parse("proposal", "proposal.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
     assert_eq!(Plan::of(&read), Plan::of(&proposal.scenario), "{text}");
     assert_eq!(read.topology, scenario.topology, "{text}");
+}
+
+/// Rules that hold are a number and the three that are nearest to their bounds; the others are there with their numbers.
+#[test]
+fn a_page_shows_the_rules_that_matter() {
+    let page = call(&Room::new(), THREE, &["--set", "slave.7.t_o=250 us"]).1;
+    let rows = |word: &str| page.lines().filter(|line| line.starts_with(word)).count();
+    assert_eq!((rows("VIOLATED"), rows("ok ")), (1, 3), "{page}");
+    assert!(page.contains(" rules hold, the tightest:\n") && page.contains("--rules"), "{page}");
+    let tight = page.lines().find(|line| line.contains("> 347.833 us") && line.starts_with("ok")).expect("T_O");
+    assert!(tight.ends_with("27.167 us") && tight.contains("slave 6, 8"), "{tight}");
+    let every = call(&Room::new(), THREE, &["--rules"]).1;
+    assert!(every.contains("of      ") && every.contains("T_SL >=") || every.contains("T_SL 1000 tbit <="), "{every}");
+}
+
+/// Without SYNCH there is no T_DP, no T_I and T_O, no window, in the page as in the picture and the data.
+#[test]
+fn a_free_running_network_is_planned_in_its_own_words() {
+    let room = Room::new();
+    let text = THREE.replace("t_dp = \"2 ms\"\nt_i = \"125 us\"\nt_o = \"375 us\"\n", "isochronous = false\n");
+    for arguments in [&[][..], &["--rules"]] {
+        let (code, page, error) = call(&room, &text, arguments);
+        assert_eq!((code, error.as_str()), (Some(0), ""), "{page}");
+        for word in ["SYNCH", "T_DP", "T_I ", "T_O", "T_PLL", "T_M "] {
+            assert!(!page.contains(word), "{word}: {page}");
+        }
+        // 3 x (143 + 200 + 231 + 76) + 33 + 76 t_bit, then FDL status, T_SL and T_ID1.
+        assert!(
+            page.contains("T_cycle 208.333 us at most (MaxTsdr), 266.75 us with a GAP poll") || {
+                // Min_Slave_Interval holds the next cycle back.
+                page.contains("Min_Slave_Interval of every slave")
+            }
+        );
+    }
+    let file = |name: &str| std::fs::read_to_string(room.path("out/three").join(name)).expect(name);
+    let (json, picture) = (file("plan.json"), file("plan.svg"));
+    let data: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!((data["isochronous"].as_bool(), data.get("cycle").is_none()), (Some(false), true));
+    assert!(data["slaves"][0].get("t_i_us").is_none() && data["slaves"][0].get("t_s_tbit").is_some());
+    assert_eq!(data["free_running"]["exchange_us"].as_f64(), Some(162.5));
+    assert!(picture.contains("T_cycle") && !picture.contains("SYNCH") && !picture.contains("T_DP"), "{picture}");
+}
+
+/// What the token does at another master is in the page, in the data and in what a rule says; the T_TR that is told does.
+#[test]
+fn a_plan_of_two_masters_tells_what_the_token_may_do() {
+    let scenario = crate::support::scenario("two-masters", &[]);
+    let (bus, t_dp) = (scenario.bus.params, scenario.master.t_dp);
+    let plan = Plan::of(&scenario);
+    assert_eq!(plan.t_th(&bus, t_dp), bus.span(Tbit(9_000)));
+    let bits = |bits: u32| bus.span(Tbit(bits));
+    // Longest Data_Exchange 143 + 800 + 231 + 76, token and T_ID1; of 27 slaves, Global_Control with T_ID2, GAP.
+    let visit = plan.visits[0];
+    assert_eq!((visit.station, visit.least, visit.longest), (address(12), bits(1_250 + 109), bits(1_250 + 109)));
+    assert_eq!(visit.work, bits(27 * 1_250 + 143 + 800 + 1_142 + 109));
+    assert_eq!(plan.content(), plan.own() + bits(1_359));
+    assert_eq!(plan.least_t_tr(&bus), Tbit(2 * (109 + 1_250) + 1_250));
+    assert_eq!(plan.synch_delay(&bus, t_dp), plan.own() + bits(9_000 + 1_359) - t_dp);
+    let t_tr = plan.longest_t_tr(&bus, t_dp).expect("a T_TR");
+    let findings = |t_tr: &str| {
+        let scenario = crate::support::scenario("two-masters", &[("bus.t_tr", t_tr)]);
+        let all = Facts::of(&scenario).findings();
+        all.into_iter().filter(|found| !found.holds()).map(|found| found.rule.text).collect::<Vec<_>>()
+    };
+    assert_eq!(findings("21000 tbit"), ["T_DP holds the longest visits of the token"]);
+    assert_eq!(findings(&t_tr.to_string()), Vec::<&str>::new());
+    assert_eq!(findings("3967 tbit"), ["T_TR >= n (T_TC + T_MC) + k T_MC"]);
+    // A run is never later than planned, and with the T_TR that is told never late.
+    for (t_tr, most) in [(bus.t_tr, plan.synch_delay(&bus, t_dp)), (t_tr, Span::ZERO)] {
+        let run = Run::of(&crate::support::scenario("two-masters", &[("bus.t_tr", &t_tr.to_string())]));
+        let late = run.counts.as_ref().map(|counts| counts.network.latest_clock);
+        assert!(late <= Some(most), "{late:?} of {most}");
+        assert_eq!(late == Some(Span::ZERO), most == Span::ZERO);
+    }
 }

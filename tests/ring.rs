@@ -333,8 +333,12 @@ fn its_slaves_get_no_isochronous_parameters() {
     let prm = SetPrm::parse(&du).expect("a good Set_Prm");
     assert!(!prm.dpv1.isom_req() && prm.group == 0);
     assert!(prm.blocks().all(|block| block.expect("a block").kind != BlockType::IsoM));
-    let planned = 2 * (143 + 800 + 231) + T_ID1 + (T_ID1 + 66 + 1_000) + (T_ID1 + 33);
-    assert_eq!(scenario.master.t_dp, bits(planned), "Data_Exchange with the longest T_SDR, GAP, token");
+    let planned = 2 * (143 + 800 + 231 + T_ID1) + (66 + 1_000 + T_ID1) + (33 + T_ID1);
+    assert_eq!(
+        scenario.master.t_dp,
+        bits(planned),
+        "Data_Exchange with the longest T_SDR, GAP, token, each with T_ID1"
+    );
 }
 
 #[test]

@@ -11,6 +11,7 @@
 //! | file | what |
 //! |---|---|
 //! | cycle | the arithmetic of the cycle, a dead time, a free-running network |
+//! | ring | the token's visits to other active stations |
 //! | finding | what a rule finds: both sides, the margin, the nearest value that would do |
 //! | rules | the registry of all rules between times; reading a scenario uses the same |
 //! | proposal | a set of values that keeps all rules, with the shortest T_DP |
@@ -25,6 +26,7 @@ pub mod finding;
 pub mod octets;
 mod page;
 pub mod proposal;
+pub mod ring;
 pub mod rules;
 
 pub use cycle::*;

@@ -253,6 +253,7 @@ fn masters(scenario: &Scenario) -> Vec<MasterLayout> {
 
 fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
     PlotMeta {
+        cycle: scenario.cycle_symbol(),
         scenario: scenario.name.clone(),
         seed: scenario.run.seed,
         t_dp: scenario.master.t_dp,

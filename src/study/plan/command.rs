@@ -20,6 +20,8 @@ pub struct Call {
     pub sets: Vec<(String, String)>,
     /// Whether the proposal is wanted instead of the page.
     pub propose: bool,
+    /// Whether the page shows every rule, not only those that are broken or tight.
+    pub rules: bool,
     /// The slave whose telegrams are wanted instead of the page.
     pub slave: Option<u8>,
     /// Where the files go: to `out/<scenario>/`.
@@ -74,7 +76,7 @@ pub fn answer(call: &Call) -> Result<Answer, PlanError> {
     } else {
         let dir = call.out.join(&scenario.name);
         let files = write(&dir, &facts, &data::json(&facts, &findings)?)?;
-        page::render(&facts, &findings, &format!("{} in {}", files.join(", "), dir.display()))
+        page::render(&facts, &findings, &format!("{} in {}", files.join(", "), dir.display()), call.rules)
     };
     Ok(Answer { page, violated })
 }

@@ -1,5 +1,6 @@
 //! Arithmetic of the bus cycle: every message cycle in it, its shares, and the spans that follow from it.
 
+use super::ring::{self, Visit};
 use crate::device::profile::Profile;
 use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
@@ -61,6 +62,8 @@ pub struct Plan {
     pub token: Span,
     /// SYNCH with the T_ID1 before it; nothing without SYNCH.
     pub synch: Span,
+    /// The token's visit to every other active station, in the order of the file.
+    pub visits: Vec<Visit>,
 }
 
 impl Plan {
@@ -68,7 +71,7 @@ impl Plan {
     pub fn of(scenario: &Scenario) -> Self {
         let bus = &scenario.bus.params;
         Self::with(scenario, |slave| {
-            let t_td = scenario.t_td(scenario.master.address, slave.address);
+            let t_td = scenario.t_td(slave.master, slave.address);
             (longest_tsdr(bus, slave, scenario.publishes(slave.address)), t_td * 2)
         })
     }
@@ -77,7 +80,7 @@ impl Plan {
     pub fn expected(scenario: &Scenario) -> Self {
         let bus = &scenario.bus.params;
         Self::with(scenario, |slave| {
-            let t_td = scenario.delay(scenario.master.address, slave.address);
+            let t_td = scenario.delay(slave.master, slave.address);
             (slave.t_sdr.max(min_tsdr(bus, scenario.publishes(slave.address))), t_td * 2)
         })
     }
@@ -100,14 +103,20 @@ impl Plan {
             gap: t_id1 + bus.span(STATUS_REQUEST + bus.t_sl),
             token: t_id1 + bus.span(TOKEN),
             synch: if clocked { t_id1 + bus.span(SYNCH) } else { Span::ZERO },
+            visits: ring::visits(scenario, |slave| slot(bus.rate, slave, Span::ZERO, delays(slave)).t_mc(bus)),
         }
     }
     /// T_DX as Set_Prm says it and slaves check it: in whole units of 1/12 us, rounded up.
     pub fn t_dx_told(&self) -> Span {
         self.t_dx.ceil_to(Span::from_iso_units(1))
     }
-    /// What every T_DP must hold: the Data_Exchange, one GAP poll, one token, SYNCH (manual 3.3.2).
+    /// What every T_DP must hold: the Data_Exchange, one GAP poll, one token, SYNCH (manual 3.3.2), and the shortest
+    /// visit of the token to every other active station.
     pub fn content(&self) -> Span {
+        self.own() + self.visits.iter().map(|visit| visit.least).sum::<Span>()
+    }
+    /// The content without other active stations.
+    pub fn own(&self) -> Span {
         self.t_dx + self.gap + self.token + self.synch
     }
     /// What a cycle of `t_dp` has left; negative if it cannot hold its content.
@@ -164,22 +173,67 @@ impl Plan {
     pub const fn t_m(&self) -> Span {
         self.t_dx
     }
-    /// A cycle of a master without SYNCH: Data_Exchange follows the token, the token the last Data_Exchange or the GAP
-    /// poll (Model: D6 without its clock).
-    pub fn free_running(&self, bus: &BusParams) -> FreeRunning {
-        let exchanges: Span = self.slots.iter().map(|slot| slot.t_mc(bus)).sum();
-        let cycle = exchanges + bus.span(TOKEN + bus.t_id1());
-        FreeRunning { cycle, with_gap: cycle + bus.span(STATUS_REQUEST + bus.t_sl + bus.t_id1()) }
+    /// A cycle of a master without SYNCH, alone in the ring: from the first bit of the first request to that of the next
+    /// cycle. Data_Exchange with every slave, then the token or the GAP poll and the token, each with T_ID1 after it
+    /// (Model: D6 without its clock). The next cycle begins no earlier than its least cycle time and Min_Slave_Interval
+    /// of every slave, from its request on, allow: a master does not wait with the token.
+    pub fn free_running(&self, scenario: &Scenario) -> FreeRunning {
+        let bus = &scenario.bus.params;
+        let interval = |slot: &Slot| Some(scenario.slave(slot.slave)?.min_slave_interval());
+        let least_cycle = match scenario.master.pace {
+            Pace::Free { least } => least,
+            Pace::Synch => Span::ZERO,
+        };
+        FreeRunning {
+            exchange: self.slots.iter().map(|slot| slot.t_mc(bus)).sum(),
+            token: bus.span(bus.t_tc()),
+            gap: bus.span(STATUS_REQUEST + bus.t_sl + bus.t_id1()),
+            least_cycle,
+            intervals: self.slots.iter().filter_map(interval).max().unwrap_or_default(),
+        }
     }
 }
 
-/// The cycle time of a network without SYNCH, from token to token of a single master.
+/// The cycle of a network without SYNCH, from the first request of a master alone to the next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FreeRunning {
-    /// Every Data_Exchange and the token.
-    pub cycle: Span,
-    /// The same with a GAP poll that nobody answers, once every G-th time.
-    pub with_gap: Span,
+    /// The message cycle of every Data_Exchange.
+    pub exchange: Span,
+    /// The token and T_ID1, T_TC.
+    pub token: Span,
+    /// A GAP poll that nobody answers and T_ID1, at every G-th token visit.
+    pub gap: Span,
+    /// From the start of one cycle to the next at least, as the master was told.
+    pub least_cycle: Span,
+    /// The same, the longest Min_Slave_Interval of the slaves.
+    pub intervals: Span,
+}
+
+impl FreeRunning {
+    /// What keeps the bus busy in a cycle without a GAP poll.
+    pub fn busy(&self) -> Span {
+        self.exchange + self.token
+    }
+    /// From the start of one cycle to the next at least, whatever it holds.
+    pub fn least(&self) -> Span {
+        self.least_cycle.max(self.intervals)
+    }
+    /// The cycle without a GAP poll.
+    pub fn cycle(&self) -> Span {
+        self.cycle_with(Span::ZERO)
+    }
+    /// The cycle with a GAP poll.
+    pub fn with_gap(&self) -> Span {
+        self.cycle_with(self.gap)
+    }
+    /// The cycle with `more` on the bus, such as an acyclic message.
+    pub fn cycle_with(&self, more: Span) -> Span {
+        (self.busy() + more).max(self.least())
+    }
+    /// Silence at the end of a cycle with `more` on the bus.
+    pub fn pause(&self, more: Span) -> Span {
+        self.cycle_with(more) - self.busy() - more
+    }
 }
 
 /// What the master application has to compute, every T_MAPC = `t_mapc` x T_DP: from T_M to the last bit of the SYNCH of
@@ -224,7 +278,7 @@ pub fn longest_tsdr(bus: &BusParams, slave: &Slave, publishes: bool) -> Tbit {
 }
 
 /// A service with data units of `request` and `reply` octets behind SAPs, from its first bit to its end at the latest.
-fn service(bus: &BusParams, request: usize, reply: usize) -> Span {
+pub(super) fn service(bus: &BusParams, request: usize, reply: usize) -> Span {
     let answer = bus.span(bus.max_tsdr) + bus.rate.octets(SAP_OVERHEAD + reply);
     bus.rate.octets(SAP_OVERHEAD + request) + answer.max(bus.span(bus.t_sl))
 }

@@ -4,10 +4,11 @@ use serde::Serialize;
 
 use super::finding::{Amount, Finding, nearest};
 use super::octets;
+use super::ring::Visit;
 use super::rules::{Facts, Weight};
 use super::{Plan, computing_time, dead_time};
 use crate::study::export::decimal::Decimal;
-use crate::study::scenario::Slave;
+use crate::study::scenario::{Pace, Slave};
 use crate::time::Span;
 
 #[derive(Serialize)]
@@ -15,9 +16,13 @@ struct Document {
     scenario: String,
     bit_rate: &'static str,
     master: u8,
+    isochronous: bool,
     holds: bool,
-    cycle: Cycle,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cycle: Option<Cycle>,
     free_running: FreeRunning,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ring: Option<Ring>,
     slaves: Vec<SlaveData>,
     rules: Vec<Verdict>,
 }
@@ -33,6 +38,7 @@ struct Cycle {
     t_mapc: u8,
     gap_us: Decimal,
     token_us: Decimal,
+    visits_us: Decimal,
     synch_us: Decimal,
     content_us: Decimal,
     spare_us: Decimal,
@@ -45,6 +51,31 @@ struct Cycle {
 struct FreeRunning {
     cycle_us: Decimal,
     cycle_with_gap_us: Decimal,
+    cycle_expected_us: Decimal,
+    exchange_us: Decimal,
+    token_us: Decimal,
+    gap_us: Decimal,
+    pause_us: Decimal,
+    least_cycle_us: Decimal,
+    slave_intervals_us: Decimal,
+}
+
+#[derive(Serialize)]
+struct Ring {
+    t_tr_tbit: u32,
+    t_tr_min_tbit: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    synch_delay_us: Option<Decimal>,
+    visits: Vec<VisitData>,
+}
+
+#[derive(Serialize)]
+struct VisitData {
+    master: u8,
+    class: u8,
+    least_us: Decimal,
+    longest_message_us: Decimal,
+    work_us: Decimal,
 }
 
 #[derive(Serialize)]
@@ -58,6 +89,15 @@ struct SlaveData {
     t_mc_us: Decimal,
     request_us: Decimal,
     reply_end_us: Decimal,
+    #[serde(flatten)]
+    instants: Option<Instants>,
+    set_prm: String,
+    chk_cfg: String,
+}
+
+/// What a slave with a clock has.
+#[derive(Serialize)]
+struct Instants {
     t_i_us: Decimal,
     t_i_min_us: Decimal,
     t_i_max_us: Decimal,
@@ -66,8 +106,6 @@ struct SlaveData {
     t_o_max_us: Decimal,
     t_pll_w_us: Decimal,
     dead_time_us: Decimal,
-    set_prm: String,
-    chk_cfg: String,
 }
 
 #[derive(Serialize)]
@@ -109,19 +147,51 @@ impl From<Amount> for Number {
 pub(super) fn json(facts: &Facts<'_>, findings: &[Finding]) -> Result<String, serde_json::Error> {
     let (scenario, plan) = (facts.scenario, &facts.plan);
     let (bus, us) = (&scenario.bus.params, Decimal::us);
-    let free = plan.free_running(bus);
+    let (free, expected) = (plan.free_running(scenario), Plan::expected(scenario).free_running(scenario));
+    let clocked = scenario.master.pace == Pace::Synch;
     let must = |found: &&Finding| found.rule.weight == Weight::Must;
     let document = Document {
         scenario: scenario.name.clone(),
         bit_rate: bus.rate.text(),
         master: scenario.master.address.get(),
         holds: findings.iter().filter(must).all(Finding::holds),
-        cycle: cycle(facts),
-        free_running: FreeRunning { cycle_us: us(free.cycle), cycle_with_gap_us: us(free.with_gap) },
+        isochronous: clocked,
+        cycle: clocked.then(|| cycle(facts)),
+        free_running: FreeRunning {
+            cycle_us: us(free.cycle()),
+            cycle_with_gap_us: us(free.with_gap()),
+            cycle_expected_us: us(expected.cycle()),
+            exchange_us: us(free.exchange),
+            token_us: us(free.token),
+            gap_us: us(free.gap),
+            pause_us: us(free.pause(Span::ZERO)),
+            least_cycle_us: us(free.least_cycle),
+            slave_intervals_us: us(free.intervals),
+        },
+        ring: (!plan.visits.is_empty()).then(|| ring(facts)),
         slaves: scenario.configured().map(|slave| slave_data(facts, slave)).collect(),
         rules: findings.iter().map(|found| verdict(found, findings)).collect(),
     };
     Ok(serde_json::to_string_pretty(&document)? + "\n")
+}
+
+fn ring(facts: &Facts<'_>) -> Ring {
+    let (scenario, plan) = (facts.scenario, &facts.plan);
+    let (bus, us) = (&scenario.bus.params, Decimal::us);
+    let clocked = scenario.master.pace == Pace::Synch;
+    let visit = |visit: &Visit| VisitData {
+        master: visit.station.get(),
+        class: visit.class,
+        least_us: us(visit.least),
+        longest_message_us: us(visit.longest),
+        work_us: us(visit.work),
+    };
+    Ring {
+        t_tr_tbit: bus.t_tr.0,
+        t_tr_min_tbit: plan.least_t_tr(bus).0,
+        synch_delay_us: clocked.then(|| us(plan.synch_delay(bus, scenario.master.t_dp))),
+        visits: plan.visits.iter().map(visit).collect(),
+    }
 }
 
 fn cycle(facts: &Facts<'_>) -> Cycle {
@@ -138,6 +208,7 @@ fn cycle(facts: &Facts<'_>) -> Cycle {
         t_mapc: master.t_mapc,
         gap_us: us(plan.gap),
         token_us: us(plan.token),
+        visits_us: us(plan.content() - plan.own()),
         synch_us: us(plan.synch),
         content_us: us(plan.content()),
         spare_us: us(plan.spare(master.t_dp)),
@@ -153,6 +224,16 @@ fn slave_data(facts: &Facts<'_>, slave: &Slave) -> SlaveData {
     let slot = plan.slot(slave.address);
     let span = |of: fn(&super::Slot) -> Span| us(slot.map_or(Span::ZERO, of));
     let [prm, cfg] = octets::telegrams(scenario, slave);
+    let instants = || Instants {
+        t_i_us: us(times.t_i),
+        t_i_min_us: us(slave.device.t_i_min(slave.functions)),
+        t_i_max_us: us(plan.t_i_max(slave, master.t_dp)),
+        t_o_us: us(times.t_o),
+        t_o_min_us: us(plan.t_o_min(&slave.device)),
+        t_o_max_us: us(plan.t_o_max(slave, master.t_dp)),
+        t_pll_w_us: us(times.t_pll_w),
+        dead_time_us: us(dead_time(times.t_i, times.t_o, master.t_dp, master.t_mapc)),
+    };
     SlaveData {
         address: slave.address.get(),
         device: slave.device.name.to_string(),
@@ -163,14 +244,7 @@ fn slave_data(facts: &Facts<'_>, slave: &Slave) -> SlaveData {
         t_mc_us: us(slot.map_or(Span::ZERO, |slot| slot.t_mc(bus))),
         request_us: span(|slot| slot.request),
         reply_end_us: span(|slot| slot.reply_end),
-        t_i_us: us(times.t_i),
-        t_i_min_us: us(slave.device.t_i_min(slave.functions)),
-        t_i_max_us: us(plan.t_i_max(slave, master.t_dp)),
-        t_o_us: us(times.t_o),
-        t_o_min_us: us(plan.t_o_min(&slave.device)),
-        t_o_max_us: us(plan.t_o_max(slave, master.t_dp)),
-        t_pll_w_us: us(times.t_pll_w),
-        dead_time_us: us(dead_time(times.t_i, times.t_o, master.t_dp, master.t_mapc)),
+        instants: scenario.is_clocked(slave).then(instants),
         set_prm: octets::hex(&prm.telegram),
         chk_cfg: octets::hex(&cfg.telegram),
     }

@@ -1,32 +1,64 @@
 //! Page: the plan as a text that fits a terminal.
 
-use super::finding::{Finding, Relation, Subject, nearest};
+use super::finding::{Amount, Finding, Relation, Subject, nearest};
 use super::rules::{Facts, Rule, Weight};
 use super::{Plan, Slot, computing_time, dead_time};
+use crate::dp::master::Pace;
 use crate::study::report::{aligned, number, ranges};
 use crate::study::scenario::{Scenario, Slave};
 use crate::time::{Span, Tbit};
 
 /// Slaves that have a line of their own; of more, equal neighbours share one.
 const SLAVES: usize = 16;
-/// Characters of the drawn cycle.
-const WIDTH: usize = 100;
+/// Characters of a line.
+const COLUMNS: usize = 100;
+/// Characters of the drawn cycle, without its ends.
+const WIDTH: usize = COLUMNS - 2;
+/// Characters of a device's name.
+const DEVICE: usize = 28;
+/// Rules that hold and have a line.
+const TIGHTEST: usize = 3;
 
-/// The page; `files` says what was written where.
-pub(super) fn render(facts: &Facts<'_>, findings: &[Finding], files: &str) -> String {
+/// The page; `files` says what was written where, `all` whether every rule is shown.
+pub(super) fn render(facts: &Facts<'_>, findings: &[Finding], files: &str, all: bool) -> String {
+    let clocked = facts.scenario.master.pace == Pace::Synch;
     let mut lines = Vec::new();
     head(facts, &mut lines);
     exchange(facts, &mut lines);
-    shares(facts, &mut lines);
-    instants(facts, &mut lines);
+    if clocked {
+        shares(facts, &mut lines);
+        instants(facts, &mut lines);
+    } else {
+        free_shares(facts, &mut lines);
+    }
     drawing(facts, &mut lines);
     beside(facts, &mut lines);
-    rules(findings, &mut lines);
+    ring(facts, &mut lines);
+    rules(findings, all, &mut lines);
     if !files.is_empty() {
         lines.push(files.to_owned());
     }
-    lines.push("octets of Set_Prm and Chk_Cfg: --slave N; times that keep all rules: --propose".to_owned());
-    lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
+    let times = if clocked { "times that keep all rules: --propose" } else { "values that keep all rules: --propose" };
+    lines.push(format!("every rule: --rules; Set_Prm and Chk_Cfg: --slave N; {times}"));
+    lines.iter().flat_map(|line| wrapped(line)).flat_map(|line| [line, "\n".to_owned()]).collect()
+}
+
+/// A line in pieces of [`COLUMNS`] characters at most, broken at spaces; the second and all others are indented.
+fn wrapped(line: &str) -> Vec<String> {
+    let mut rest = line.trim_end().to_owned();
+    let mut pieces = Vec::new();
+    while rest.chars().count() > COLUMNS {
+        let indent = rest.len() - rest.trim_start().len();
+        let end = rest.char_indices().nth(COLUMNS).map_or(rest.len(), |(at, _)| at);
+        let space =
+            rest[..=end].rfind(' ').filter(|&at| at > indent).or_else(|| rest[end..].find(' ').map(|at| at + end));
+        let Some(space) = space else { break };
+        let next = format!("    {}", rest[space..].trim_start());
+        rest.truncate(space);
+        pieces.push(std::mem::replace(&mut rest, next).trim_end().to_owned());
+    }
+    pieces.push(rest);
+    pieces
 }
 
 /// A span in bit times, with a decimal where a cable makes one.
@@ -44,10 +76,12 @@ fn us(span: Span) -> String {
 fn head(facts: &Facts<'_>, lines: &mut Vec<String>) {
     let (scenario, plan) = (facts.scenario, &facts.plan);
     let bus = &scenario.bus.params;
+    let clocked = scenario.master.pace == Pace::Synch;
     lines.push(format!(
-        "{}: master {}, {}, {}, {}, {}",
+        "{}: master {}, {}{}, {}, {}, {}{}",
         scenario.name,
         scenario.master.address,
+        if clocked { "" } else { "free-running, " },
         number(plan.slots.len(), "slave"),
         number(scenario.links.len(), "link"),
         bus.rate,
@@ -55,14 +89,21 @@ fn head(facts: &Facts<'_>, lines: &mut Vec<String>) {
             [line] => format!("cable {} m", line.cable_mm as f64 / 1e3),
             segments => number(segments.len(), "segment"),
         },
+        match plan.visits.len() {
+            0 => String::new(),
+            others => format!(", {}", number(others, "other master")),
+        },
     ));
-    let shortest = scenario.configured().map(|slave| plan.t_dp_min(&slave.device)).max().unwrap_or_default();
-    lines.push(format!(
-        "T_DP {}, its content needs {shortest}   T_DX {} at most (MaxTsdr), {} expected (own T_SDR)",
-        scenario.master.t_dp,
-        plan.t_dx,
-        Plan::expected(scenario).t_dx
-    ));
+    let expected = Plan::expected(scenario);
+    if clocked {
+        let shortest = scenario.configured().map(|slave| plan.t_dp_min(&slave.device)).max().unwrap_or_default();
+        lines.push(format!("T_DP {}, its content needs {shortest}", scenario.master.t_dp));
+        lines.push(format!("T_DX {} at most (MaxTsdr), {} expected (own T_SDR)", plan.t_dx, expected.t_dx));
+    } else {
+        let (most, own) = (plan.free_running(scenario), expected.free_running(scenario));
+        lines.push(format!("T_cycle {} at most (MaxTsdr), {} with a GAP poll", most.cycle(), most.with_gap()));
+        lines.push(format!("T_cycle {} expected (own T_SDR), {} with a GAP poll", own.cycle(), own.with_gap()));
+    }
     lines.push(format!("T_ID1 {}   T_ID2 {}   T_SL {}   bit {}", bus.t_id1(), bus.t_id2(), bus.t_sl, bus.rate.bit()));
 }
 
@@ -97,54 +138,71 @@ fn exchange(facts: &Facts<'_>, lines: &mut Vec<String>) {
             let both = |of: &dyn Fn(&Slot) -> String| span_of(&of(&first), &of(&last));
             vec![
                 names(&group),
-                group[0].device.name.to_string(),
+                group[0].device.name.chars().take(DEVICE).collect(),
                 first.t_s.0.to_string(),
                 first.t_sdr.0.to_string(),
                 first.t_r.0.to_string(),
                 both(&|slot| bits(scenario, slot.t_td_both)),
-                bus.t_id1().0.to_string(),
-                both(&|slot| bits(scenario, slot.t_mc(bus))),
                 both(&|slot| us(slot.t_mc(bus))),
                 us(first.request),
                 us(last.reply_end),
             ]
         })
     });
-    let header = [
-        "slave",
-        "device",
-        "T_S",
-        "T_SDR",
-        "T_R",
-        "2 T_TD",
-        "T_ID1",
-        "T_MC tbit",
-        "T_MC us",
-        "request us",
-        "reply ends us",
-    ];
+    let header = ["slave", "device", "T_S", "T_SDR", "T_R", "2 T_TD", "T_MC us", "start us", "end us"];
+    let from = if scenario.master.pace == Pace::Synch { "t0 (last bit of SYNCH)" } else { "the first request" };
     lines.push(String::new());
-    lines.push("Data_Exchange at the longest, from t0 (last bit of SYNCH); T_S to T_ID1 in tbit".to_owned());
+    lines.push(format!("Data_Exchange at the longest, from {from} on; T_S to 2 T_TD in tbit"));
     lines.extend(aligned(&header, &[0, 1], &rows.collect::<Vec<_>>()));
 }
 
 fn shares(facts: &Facts<'_>, lines: &mut Vec<String>) {
     let (scenario, plan) = (facts.scenario, &facts.plan);
     let t_dp = scenario.master.t_dp;
-    let row = |name: &str, span: Span| {
-        let share = 100.0 * span.ticks() as f64 / t_dp.ticks().max(1) as f64;
-        vec![name.to_owned(), bits(scenario, span), us(span), format!("{share:.1} %")]
+    let visits = plan.content() - plan.own();
+    let mut rows = vec![
+        ("T_DX: T_ID2 and every Data_Exchange".to_owned(), plan.t_dx),
+        ("GAP: T_ID1, FDL status, T_SL".to_owned(), plan.gap),
+        ("token: T_ID1, 3 octets".to_owned(), plan.token),
+        ("SYNCH: T_ID1, T_GC of 13 octets".to_owned(), plan.synch),
+        ("spare: acyclic messages, silence".to_owned(), plan.spare(t_dp)),
+        ("T_DP".to_owned(), t_dp),
+    ];
+    if !plan.visits.is_empty() {
+        rows.insert(3, (format!("visits to {} at least", number(plan.visits.len(), "other master")), visits));
+    }
+    share_table(scenario, ("share of the cycle", "of T_DP"), &rows, lines);
+}
+
+/// The shares of the free-running cycle with a GAP poll.
+fn free_shares(facts: &Facts<'_>, lines: &mut Vec<String>) {
+    let (scenario, plan) = (facts.scenario, &facts.plan);
+    let free = plan.free_running(scenario);
+    let why = match (free.pause(Span::ZERO) > Span::ZERO, free.least_cycle >= free.intervals) {
+        (false, _) => "none is due",
+        (true, true) => "least_cycle",
+        (true, false) => "Min_Slave_Interval of every slave from its request on",
     };
     let rows = [
-        row("T_DX: T_ID2 and every Data_Exchange", plan.t_dx),
-        row("GAP: T_ID1, FDL status, T_SL", plan.gap),
-        row("token: T_ID1, 3 octets", plan.token),
-        row("SYNCH: T_ID1, T_GC of 13 octets", plan.synch),
-        row("spare: acyclic messages, silence", plan.spare(t_dp)),
-        row("T_DP", t_dp),
+        ("every Data_Exchange with T_ID1".to_owned(), free.exchange),
+        ("token, 3 octets, with T_ID1".to_owned(), free.token),
+        (format!("pause: {why}"), free.pause(Span::ZERO)),
+        ("T_cycle".to_owned(), free.cycle()),
+        (format!("GAP at every {}. visit: FDL status, T_SL, T_ID1", scenario.bus.params.gap_factor), free.gap),
+        ("T_cycle with it".to_owned(), free.with_gap()),
     ];
+    share_table(scenario, ("share of the cycle", "of T_cycle"), &rows, lines);
+}
+
+fn share_table(scenario: &Scenario, (title, of): (&str, &str), rows: &[(String, Span)], lines: &mut Vec<String>) {
+    // Without SYNCH the cycle without a GAP poll is what happens most of the time.
+    let whole = rows.iter().find(|row| row.0 == "T_DP" || row.0 == "T_cycle").map_or(Span::ZERO, |row| row.1);
+    let row = |(name, span): &(String, Span)| {
+        let share = 100.0 * span.ticks() as f64 / whole.ticks().max(1) as f64;
+        vec![name.clone(), bits(scenario, *span), us(*span), format!("{share:.1} %")]
+    };
     lines.push(String::new());
-    lines.extend(aligned(&["share of the cycle", "tbit", "us", "of T_DP"], &[0], &rows));
+    lines.extend(aligned(&[title, "tbit", "us", of], &[0], &rows.iter().map(row).collect::<Vec<_>>()));
 }
 
 /// A range of times, or that there is none.
@@ -176,13 +234,13 @@ fn instants(facts: &Facts<'_>, lines: &mut Vec<String>) {
     lines.push(String::new());
     lines.extend(aligned(&header, &[0], &rows.collect::<Vec<_>>()));
     lines.push(format!(
-        "T_M {}: the master application may compute from then on, for {} (T_MAPC {} x T_DP - T_DX)",
+        "T_M {}: the master application may compute from then on, for {} (T_MAPC {})",
         plan.t_m(),
         computing_time(plan, master.t_dp, master.t_mapc),
         master.t_mapc
     ));
     lines.push(
-        "dead time = T_I + T_MAPC x T_DP + T_O: latch, data in the next cycle, compute, set point in the cycle after"
+        "dead time = T_I + T_MAPC x T_DP + T_O: latch, data a cycle later, compute, set point the cycle after"
             .to_owned(),
     );
 }
@@ -215,7 +273,8 @@ impl Strip {
 fn drawing(facts: &Facts<'_>, lines: &mut Vec<String>) {
     let (scenario, plan) = (facts.scenario, &facts.plan);
     let (bus, t_dp) = (&scenario.bus.params, scenario.master.t_dp);
-    let whole = t_dp.max(plan.content());
+    let clocked = scenario.master.pace == Pace::Synch;
+    let whole = if clocked { t_dp.max(plan.content()) } else { t_dp };
     let (mut strip, mut marks) = (Strip::new(whole), Strip::new(whole));
     strip.paint(Span::ZERO, whole, '.');
     for (number, slot) in plan.slots.iter().enumerate() {
@@ -224,19 +283,28 @@ fn drawing(facts: &Facts<'_>, lines: &mut Vec<String>) {
     let t_id1 = bus.span(bus.t_id1());
     strip.paint(plan.t_dx + t_id1, plan.t_dx + plan.gap, 'G');
     strip.paint(plan.t_dx + plan.gap + t_id1, plan.t_dx + plan.gap + plan.token, 't');
-    strip.paint(whole - bus.span(super::SYNCH), whole, 'S');
-    for slave in scenario.configured().filter(|slave| slave.device.isochronous) {
+    let mut legend = "D d Data_Exchange, slave by slave  G GAP  t token  . silence".to_owned();
+    if !plan.visits.is_empty() {
+        let from = plan.t_dx + plan.gap + plan.token;
+        strip.paint(from, from + (plan.content() - plan.own()), 'v');
+        legend += "  v visits";
+    }
+    if clocked {
+        strip.paint(whole - bus.span(super::SYNCH), whole, 'S');
+        legend += "  S SYNCH";
+    }
+    for slave in scenario.configured().filter(|slave| scenario.is_clocked(slave)) {
         marks.paint(slave.times.t_o, slave.times.t_o, 'O');
         marks.paint(t_dp - slave.times.t_i, t_dp - slave.times.t_i, 'I');
     }
     lines.push(String::new());
-    lines.push(format!(" {}", marks.text()));
+    if clocked {
+        lines.push(format!(" {}", marks.text()));
+        legend += "  O T_O  I T_I";
+    }
     lines.push(format!("|{}|", strip.text()));
     lines.push(format!("0{:>width$}", whole.to_string(), width = WIDTH + 1));
-    lines.push(
-        "D d Data_Exchange with one slave after the other   G GAP   t token   S SYNCH   . silence   O T_O   I latch (T_I)"
-            .to_owned(),
-    );
+    lines.push(legend);
 }
 
 fn beside(facts: &Facts<'_>, lines: &mut Vec<String>) {
@@ -244,25 +312,64 @@ fn beside(facts: &Facts<'_>, lines: &mut Vec<String>) {
     const READ: (usize, usize) = (14, 244);
     let (scenario, plan) = (facts.scenario, &facts.plan);
     let bus = &scenario.bus.params;
+    let clocked = scenario.master.pace == Pace::Synch;
     let spare = plan.spare(scenario.master.t_dp);
-    let (read, repeat) = (plan.acyclic(bus, READ.0, READ.1), plan.repeat(bus));
-    let free = plan.free_running(bus);
+    let free = plan.free_running(scenario);
     lines.push(String::new());
     for (what, span) in [
-        ("a repeated Data_Exchange: T_S, T_SL, T_ID1".to_owned(), repeat),
-        (format!("an acyclic message with {} octets back", READ.1), read),
+        ("a repeated Data_Exchange: T_S, T_SL, T_ID1".to_owned(), plan.repeat(bus)),
+        (format!("an acyclic message with {} octets back", READ.1), plan.acyclic(bus, READ.0, READ.1)),
         ("a Global_Control that tells the mode, with T_ID2".to_owned(), plan.mode(bus)),
     ] {
-        let fits = if span <= spare { "fits into" } else { "does not fit into" };
-        lines.push(format!("{what}, {span}, {fits} the spare time"));
+        lines.push(match (clocked, span <= spare) {
+            (true, true) => format!("{what}, {span}, fits into the spare time"),
+            (true, false) => format!("{what}, {span}, does not fit into the spare time"),
+            (false, _) => format!("{what}, {span}, makes T_cycle {}", free.cycle_with(span)),
+        });
     }
-    let exchange = plan.slots.iter().map(|slot| slot.t_mc(bus)).max().unwrap_or_default();
-    let t_mc = Tbit(exchange.ceil_to(bus.rate.bit()).div_floor(bus.rate.bit()) as u32);
-    let t_tr = bus.least_t_tr(1, 1, t_mc);
+    if clocked {
+        lines.push(format!("without SYNCH a cycle takes {}, {} with a GAP poll", free.cycle(), free.with_gap()));
+    }
+}
+
+/// What the token does at the other masters.
+fn ring(facts: &Facts<'_>, lines: &mut Vec<String>) {
+    let (scenario, plan) = (facts.scenario, &facts.plan);
+    let (bus, t_dp) = (&scenario.bus.params, scenario.master.t_dp);
+    if plan.visits.is_empty() {
+        return;
+    }
+    let clocked = scenario.master.pace == Pace::Synch;
+    // A free-running master leaves the others T_TR less the shortest rotation.
+    let visits = plan.content() - plan.own();
+    let rotation = if clocked { t_dp } else { bus.span(bus.t_tc() + plan.longest_high(bus)) + visits };
+    let t_th = plan.t_th(bus, rotation);
+    let rows = plan.visits.iter().map(|visit| {
+        let what = format!("class {}", visit.class);
+        vec![visit.station.to_string(), what, us(visit.least), us(visit.longest), us(visit.work), us(visit.most(t_th))]
+    });
+    lines.push(String::new());
+    lines.push("the token's visits to other masters, each with the token itself".to_owned());
+    let header = ["master", "is", "at least us", "one message us", "all its work us", "at most us"];
+    lines.extend(aligned(&header, &[1], &rows.collect::<Vec<_>>()));
+    let bits_of = |bits: Tbit| format!("{bits} ({})", bus.span(bits));
     lines.push(format!(
-        "without SYNCH a cycle takes {}, {} with a GAP poll; T_TR >= {t_tr} with one low-priority message per rotation",
-        free.cycle, free.with_gap
+        "T_TR {}; at least {} for a message of every master",
+        bits_of(bus.t_tr),
+        bits_of(plan.least_t_tr(bus))
     ));
+    if !clocked {
+        lines.push(format!("T_TH is up to {t_th}: T_TR - T_RR, the shortest rotation {rotation}"));
+        return;
+    }
+    lines.push(format!("T_TH of the others is {t_th}: T_TR - T_RR, and T_RR is T_DP"));
+    lines.push(match plan.synch_delay(bus, t_dp) {
+        Span::ZERO => format!("the token is back {} before SYNCH or more", t_dp - plan.content_at_most(t_th)),
+        late => match plan.longest_t_tr(bus, t_dp) {
+            Some(t_tr) => format!("the token may delay SYNCH by up to {late}; with t_tr = \"{t_tr}\" it does not"),
+            None => format!("the token may delay SYNCH by up to {late}, whatever T_TR is"),
+        },
+    });
 }
 
 /// What a rule found of one kind of value, equal findings together.
@@ -337,24 +444,61 @@ fn gathered(findings: &[Finding]) -> Vec<Line<'_>> {
     lines
 }
 
-fn rules(findings: &[Finding], lines: &mut Vec<String>) {
+fn row(line: &Line<'_>) -> Vec<String> {
+    let verdict = match (line.holds(), line.rule.weight) {
+        (true, _) => "ok",
+        (false, Weight::Must) => "VIOLATED",
+        (false, _) => "warning",
+    };
+    vec![verdict.to_owned(), line.who(), line.numbers(), line.margin(), line.rule.source.to_owned()]
+}
+
+/// The rules that hold with the smallest margins in relation to their bounds: times, and none whose bounds leave one
+/// value only.
+fn tightest<'l, 'a>(all: &'l [Line<'a>]) -> Vec<&'l Line<'a>> {
+    let share = |line: &&Line<'_>| {
+        let fixed = matches!(line.sides.as_slice(), [low, high] if low.bound == high.bound);
+        let side = line.sides.iter().filter_map(|side| match (side.margin_amount()?, side.bound) {
+            (Amount::Time(margin), Amount::Time(bound)) if bound > Span::ZERO => {
+                Some(i128::from(margin.ticks()) * 1_000_000_000 / i128::from(bound.ticks()))
+            }
+            _ => None,
+        });
+        if fixed { None } else { side.min() }
+    };
+    let mut held: Vec<_> =
+        all.iter().filter(|line| line.holds()).filter_map(|line| Some((share(&line)?, line))).collect();
+    held.sort_by_key(|pair| pair.0);
+    held.into_iter().take(TIGHTEST).map(|pair| pair.1).collect()
+}
+
+fn rules(findings: &[Finding], show_all: bool, lines: &mut Vec<String>) {
     let all = gathered(findings);
     let broken = |weight: fn(Weight) -> bool| all.iter().filter(move |line| !line.holds() && weight(line.rule.weight));
     let (wrong, warned) =
         (broken(|weight| weight == Weight::Must).count(), broken(|weight| weight != Weight::Must).count());
-    lines.push(String::new());
-    let rows: Vec<_> = all
-        .iter()
-        .map(|line| {
-            let verdict = match (line.holds(), line.rule.weight) {
-                (true, _) => "ok",
-                (false, Weight::Must) => "VIOLATED",
-                (false, _) => "warning",
-            };
-            vec![verdict.to_owned(), line.who(), line.numbers(), line.margin(), line.rule.source.to_owned()]
-        })
-        .collect();
-    lines.extend(aligned(&["", "of", "rule", "margin", "source"], &[0, 1, 2, 4], &rows));
+    let mut table = |title: String, columns: usize, shown: &[&Line<'_>]| {
+        let rows: Vec<_> = shown.iter().map(|line| row(line)).collect();
+        let with = |columns: usize| {
+            let rows: Vec<_> = rows.iter().map(|row| row[..columns].to_vec()).collect();
+            aligned(&["", "of", "rule", "margin", "source"][..columns], &[0, 1, 2, 4], &rows)
+        };
+        let whole = with(columns);
+        let fits = show_all || whole.iter().all(|line| line.trim_end().chars().count() <= COLUMNS);
+        lines.push(title);
+        // Sources go first where they do not fit; --rules has them all.
+        lines.extend(if fits { whole } else { with(4) });
+    };
+    if show_all {
+        table(String::new(), 5, &all.iter().collect::<Vec<_>>());
+    } else {
+        let off: Vec<_> = all.iter().filter(|line| !line.holds()).collect();
+        if !off.is_empty() {
+            table(String::new(), 5, &off);
+        }
+        let held = all.len() - off.len();
+        table(format!("\n{} hold, the tightest:", number(held, "rule")), 4, &tightest(&all));
+    }
     lines.push(String::new());
     lines.push(format!(
         "rules: {}{}",
@@ -362,14 +506,19 @@ fn rules(findings: &[Finding], lines: &mut Vec<String>) {
         if warned == 0 { String::new() } else { format!(", {}", number(warned, "warning")) }
     ));
     for line in all.iter().filter(|line| !line.holds()) {
-        let side = line.sides.iter().find(|side| !side.holds()).unwrap_or(&line.sides[0]);
-        let message = side.fault.as_ref().map_or_else(|| line.numbers(), |fault| fault.message.clone());
-        let near = match nearest(side, findings) {
-            Some(near) => format!("nearest {} = {near}", side.key.name),
-            None if side.follows => side.fault.as_ref().map_or_else(String::new, |fault| fault.help.clone()),
-            None => format!("no {} does with the other values as they are: --propose", side.key.name),
-        };
-        let word = if line.rule.weight == Weight::Must { "violated" } else { "warning" };
-        lines.push(format!("{word}: {}: {message}; {near}", line.who()).trim_end_matches("; ").to_owned());
+        lines.push(complaint(line, findings));
     }
+}
+
+/// A rule that does not hold, in a sentence with what would do.
+fn complaint(line: &Line<'_>, findings: &[Finding]) -> String {
+    let side = line.sides.iter().find(|side| !side.holds()).unwrap_or(&line.sides[0]);
+    let message = side.fault.as_ref().map_or_else(|| line.numbers(), |fault| fault.message.clone());
+    let near = match nearest(side, findings) {
+        Some(near) => format!("nearest {} = {near}", side.key.name),
+        None if side.follows => side.fault.as_ref().map_or_else(String::new, |fault| fault.help.clone()),
+        None => format!("no {} does with the other values as they are: --propose", side.key.name),
+    };
+    let word = if line.rule.weight == Weight::Must { "violated" } else { "warning" };
+    format!("{word}: {}: {message}; {near}", line.who()).trim_end_matches("; ").to_owned()
 }

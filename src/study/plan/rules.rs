@@ -88,7 +88,7 @@ pub static CYCLE: &[Rule] = &[
     Rule::must("TDP_MIN <= T_DP <= TDP_MAX", "manual 3.3.2", cycle::t_dp_limits).clocked(),
     Rule::must("500 us <= T_DP <= 32 ms", "Set_Prm block 04", cycle::t_dp_system).clocked(),
     Rule::must("T_DP = n x T_BASE_DP", "manual 3.3.1, 3.3.2", cycle::t_dp_grid).clocked(),
-    Rule::must("T_DP >= T_DX + GAP + token + SYNCH", "manual 3.3.2", cycle::t_dp_content).clocked(),
+    Rule::must("T_DP >= T_DX + GAP + token + visits + SYNCH", "manual 3.3.2", cycle::t_dp_content).clocked(),
     Rule::must("T_DX < T_DP", "manual 3.3.2", cycle::t_dx_ends).clocked(),
     Rule::must("T_BASE_DP, T_BASE_IO are time bases", "Set_Prm block 04", cycle::time_bases).clocked(),
     Rule::must("1 <= T_MAPC <= 14 (T_DP)", "manual 3.3.3, octet 43", cycle::t_mapc),
@@ -134,6 +134,9 @@ pub static ADVICE: &[Rule] = &[
     Rule::advice("T_PLL_W >= 2 x jitter of SYNCH", "Model: D1, D11", advice::jitter_within_window).clocked(),
     Rule::advice("revolutions x units = n x total range", "Model: D22", advice::seamless).clocked(),
     Rule::advice("T_DP holds a repeated Data_Exchange", "Model: D7", advice::repeats_fit).clocked(),
+    Rule::advice("T_TR >= n (T_TC + T_MC) + k T_MC", "felser.ch, token_umlaufzeit", advice::rotation),
+    Rule::advice("T_DP holds the longest visits of the token", "EN 50170-2, Model: D6", advice::token_in_time)
+        .clocked(),
     Rule::advice("T_DP - T_DX >= 2 x T_BASE_IO of a drive", "SINAMICS A01902", advice::drive_cycles).clocked(),
     Rule::advice("T_DP >= T_I + T_O + T_BASE_IO of a drive", "SINAMICS A01902", advice::drive_instants).clocked(),
 ];

@@ -59,6 +59,8 @@ pub(super) struct View<'a> {
     pub(super) t0: Time,
     /// First bit of the next SYNCH and the next t0 [µs].
     pub(super) next: (f64, f64),
+    /// Whether the cycle begins with SYNCH.
+    pub(super) clocked: bool,
 }
 
 impl View<'_> {
@@ -94,7 +96,11 @@ impl View<'_> {
     fn dimensions(&self) -> Vec<Dimension> {
         let us = |value: f64| format!("{} us", plain(value, 2));
         let t_dp = self.next.1;
-        let mut all = vec![Dimension { label: format!("T_DP {}", us(t_dp)), from: 0.0, to: t_dp }];
+        let mut all = vec![Dimension {
+            label: format!("{} {}", if self.clocked { "T_DP" } else { "T_cycle" }, us(t_dp)),
+            from: 0.0,
+            to: t_dp,
+        }];
         if let Some((t_o, differ, slave)) = self.t_o() {
             let who = if differ { format!(" (latest: slave {slave})") } else { String::new() };
             all.push(Dimension { label: format!("T_O {}{who}", us(t_o)), from: 0.0, to: t_o });
@@ -108,7 +114,8 @@ impl View<'_> {
         }
         let (quiet, next) = (self.quiet(), self.next.0);
         if next > quiet {
-            all.push(Dimension { label: format!("spare {}", us(next - quiet)), from: quiet, to: next });
+            let word = if self.clocked { "spare" } else { "silence" };
+            all.push(Dimension { label: format!("{word} {}", us(next - quiet)), from: quiet, to: next });
         }
         all
     }
@@ -136,7 +143,7 @@ pub(super) fn draw(material: &Material<'_>) -> Result<String, String> {
         return empty_page(meta, &words, "No complete bus cycle was seen: fewer than two SYNCH were on the line.");
     };
     let next = ((next.0 - t0).as_us(), (next.1 - t0).as_us());
-    let view = View { cycle, slaves: &meta.slaves, t0, next };
+    let view = View { cycle, slaves: &meta.slaves, t0, next, clocked: true };
     words.subtitle = subtitle(&view);
     draw_view(meta, &words, &view)
 }
@@ -224,8 +231,10 @@ fn bus_lane(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, lane: Area)
         let (left, right) = place(bar);
         canvas.fill(Area { left, right, ..lane }, colour(bar.kind));
     }
-    let next = Area { left: ruler.x(view.next.0), right: ruler.x(view.next.1), ..lane };
-    canvas.fill(next, colour(Kind::Synch));
+    if view.clocked {
+        let next = Area { left: ruler.x(view.next.0), right: ruler.x(view.next.1), ..lane };
+        canvas.fill(next, colour(Kind::Synch));
+    }
 }
 
 /// Names above the bus lane at `bottom`: first the rare ones, each with a leader, then the slaves as far as they fit.
@@ -234,7 +243,9 @@ fn names(canvas: &mut Canvas<'_>, view: &View<'_>, ruler: &Ruler, bottom: i32) {
     let asking = view.cycle.bars.iter().filter(|bar| bar.asks);
     let mut all: Vec<(Kind, i32, String)> =
         asking.map(|bar| (bar.kind, centre(view.us(bar.start), view.us(bar.end)), name(bar))).collect();
-    all.push((Kind::Synch, centre(view.next.0, view.next.1), "SYNCH".to_owned()));
+    if view.clocked {
+        all.push((Kind::Synch, centre(view.next.0, view.next.1), "SYNCH".to_owned()));
+    }
     // The next SYNCH of a plan can come before the end of its cycle.
     all.sort_by_key(|entry| entry.1);
     let (slaves, rare): (Vec<_>, Vec<_>) =

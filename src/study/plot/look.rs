@@ -313,9 +313,10 @@ pub(super) fn page(
     let bottom = top + body_height;
     let height = bottom + FOOTER + 2 * MARGIN;
     let footer = format!(
-        "isodp | scenario {}, seed {}, T_DP {}, {}, {} | {}",
+        "isodp | scenario {}, seed {}, {} {}, {}, {} | {}",
         fit(&meta.scenario, FOOTER, room / 3),
         meta.seed,
+        meta.cycle,
         meta.t_dp,
         counted(meta.slaves.len() as u64, "slave"),
         meta.duration,

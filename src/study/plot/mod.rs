@@ -63,6 +63,8 @@ pub struct PlotMeta {
     pub scenario: String,
     /// Its seed.
     pub seed: u64,
+    /// Symbol of the bus cycle: T_DP, or T_cycle without SYNCH.
+    pub cycle: &'static str,
     /// Nominal T_DP.
     pub t_dp: Span,
     /// The slaves, ascending.

@@ -5,7 +5,7 @@ use super::look::Words;
 use super::telegrams::{Bar, Cycle, Kind};
 use super::{PlotError, PlotMeta};
 use crate::study::plan::{self, Plan};
-use crate::study::scenario::{Extent, Scenario};
+use crate::study::scenario::{Extent, Pace, Scenario};
 use crate::study::topology::Map;
 use crate::time::{Span, Time};
 use crate::wire::Address;
@@ -18,28 +18,57 @@ const FILE: &str = "plan.svg";
 /// What the library says.
 pub fn draw(scenario: &Scenario, planned: &Plan) -> Result<String, PlotError> {
     let (t_dp, bus) = (scenario.master.t_dp, &scenario.bus.params);
+    let clocked = scenario.master.pace == Pace::Synch;
     // Long enough ago that nothing is before the beginning of time.
     let t0 = Time::ZERO + Span::from_s(10);
     let cycle = cycle(scenario, planned, t0);
     let meta = meta(scenario);
     let us = |span: Span| span.as_us();
-    let next = (us(t_dp - bus.span(plan::SYNCH)), us(t_dp));
-    let view = View { cycle: &cycle, slaves: &meta.slaves, t0, next };
-    let spare = planned.spare(t_dp);
+    let next = if clocked { t_dp - bus.span(plan::SYNCH) } else { t_dp };
+    let view = View { cycle: &cycle, slaves: &meta.slaves, t0, next: (us(next), us(t_dp)), clocked };
+    let (title, subtitle) = if clocked {
+        ("Plan: the bus cycle at its longest, to scale", isochronous(scenario, planned))
+    } else {
+        ("Plan: the free-running bus cycle with a GAP poll, to scale", free_running(scenario, planned))
+    };
+    let visits: Vec<_> = planned.visits.iter().map(|visit| visit.station.to_string()).collect();
+    let others = match visits.as_slice() {
+        [] => String::new(),
+        _ => format!(" The visits of the token to the masters {} come after the token.", visits.join(", ")),
+    };
+    let words = Words {
+        title,
+        subtitle: format!("{subtitle}{others} A telegram shorter than a pixel is one pixel wide."),
+        plotted: if clocked {
+            "planned telegrams, T_O and T_I of one bus cycle"
+        } else {
+            "planned telegrams of one bus cycle"
+        },
+    };
+    bus_cycle::draw_view(&meta, &words, &view).map_err(|reason| PlotError { file: FILE, reason })
+}
+
+fn isochronous(scenario: &Scenario, planned: &Plan) -> String {
+    let spare = planned.spare(scenario.master.t_dp);
     let rest = if spare < Span::ZERO {
         format!("T_DP is {} too short for its content of {}.", -spare, planned.content())
     } else {
         format!("{spare} of T_DP are spare, with T_ID1 kept before SYNCH.")
     };
-    let words = Words {
-        title: "Plan: the bus cycle at its longest, to scale",
-        subtitle: format!(
-            "from SYNCH to the next SYNCH; t0 is the last bit of SYNCH. Every slave takes its longest T_SDR, a GAP poll is \
-             not answered. {rest} A telegram shorter than a pixel is one pixel wide."
-        ),
-        plotted: "planned telegrams, T_O and T_I of one bus cycle",
-    };
-    bus_cycle::draw_view(&meta, &words, &view).map_err(|reason| PlotError { file: FILE, reason })
+    format!(
+        "from SYNCH to the next SYNCH; t0 is the last bit of SYNCH. Every slave takes its longest T_SDR, a GAP poll is not \
+         answered. {rest}"
+    )
+}
+
+fn free_running(scenario: &Scenario, planned: &Plan) -> String {
+    let free = planned.free_running(scenario);
+    format!(
+        "from the first bit of the first request to the same of the next cycle, {} with a GAP poll and {} without. Every \
+         slave takes its longest T_SDR, a GAP poll is not answered.",
+        free.with_gap(),
+        free.cycle()
+    )
 }
 
 fn meta(scenario: &Scenario) -> PlotMeta {
@@ -48,6 +77,7 @@ fn meta(scenario: &Scenario) -> PlotMeta {
         scenario: scenario.name.clone(),
         topology: Map::of(scenario),
         seed: scenario.run.seed,
+        cycle: scenario.cycle_symbol(),
         t_dp,
         slaves: scenario.configured().map(|slave| slave.address).collect(),
         links: scenario.links.iter().map(|link| (link.publisher, link.subscriber)).collect(),
@@ -63,12 +93,16 @@ fn meta(scenario: &Scenario) -> PlotMeta {
 fn cycle(scenario: &Scenario, planned: &Plan, t0: Time) -> Cycle {
     let bus = &scenario.bus.params;
     let (t_dp, t_gc) = (scenario.master.t_dp, bus.span(plan::SYNCH));
-    let mut cycle = Cycle::planned(t0, (t0 + t_dp - t_gc, t0 + t_dp));
+    let clocked = scenario.master.pace == Pace::Synch;
+    let next = if clocked { t_dp - t_gc } else { t_dp };
+    let mut cycle = Cycle::planned(t0, (t0 + next, t0 + t_dp));
     let mut bar = |from: Span, to: Span, kind: Kind, slave: Option<Address>| {
         let asks = !matches!(kind, Kind::Reply | Kind::DxbReply);
         cycle.push(Bar { start: t0 + from, end: t0 + to, kind, asks, slave, other: None });
     };
-    bar(-t_gc, Span::ZERO, Kind::Synch, None);
+    if clocked {
+        bar(-t_gc, Span::ZERO, Kind::Synch, None);
+    }
     for slot in &planned.slots {
         let reply = if scenario.publishes(slot.slave) { Kind::DxbReply } else { Kind::Reply };
         bar(slot.request, slot.request_end, Kind::Request, Some(slot.slave));
@@ -79,7 +113,7 @@ fn cycle(scenario: &Scenario, planned: &Plan, t0: Time) -> Cycle {
     bar(gap, gap + bus.span(plan::STATUS_REQUEST), Kind::Gap, None);
     let token = planned.t_dx + planned.gap + t_id1;
     bar(token, token + bus.span(plan::TOKEN), Kind::Token, None);
-    for slave in scenario.configured() {
+    for slave in scenario.configured().filter(|slave| scenario.is_clocked(slave)) {
         cycle.plan_slave(slave.address, t0 + slave.times.t_o, t0 + t_dp - slave.times.t_i);
     }
     cycle

@@ -74,6 +74,7 @@ impl World {
         let topology = segments(&slaves);
         let links: Vec<_> = slaves.iter().skip(1).map(|&subscriber| (slaves[0], subscriber)).collect();
         let meta = PlotMeta {
+            cycle: "T_DP",
             scenario: format!("invented-{}", slaves.len()),
             seed: 42,
             t_dp,

@@ -52,6 +52,10 @@ impl Scenario {
     pub fn class1(&self, address: Address) -> Option<&Class1> {
         self.class1.iter().find(|class1| class1.address == address)
     }
+    /// Symbol of the bus cycle: T_DP, of a free-running master T_cycle.
+    pub fn cycle_symbol(&self) -> &'static str {
+        if self.master.pace == Pace::Synch { "T_DP" } else { "T_cycle" }
+    }
     /// Whether `slave` is clocked: its master sends SYNCH, and the device has isochronous mode. Any other slave gets no
     /// isochronous block and runs freely, also in a network whose cycle is isochronous.
     pub fn is_clocked(&self, slave: &Slave) -> bool {

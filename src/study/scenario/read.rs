@@ -101,8 +101,8 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         disturbances,
         record,
     };
-    if let Pace::Free { least } = scenario.master.pace {
-        scenario.master.t_dp = Plan::of(&scenario).content().max(least);
+    if scenario.master.pace != Pace::Synch {
+        scenario.master.t_dp = Plan::of(&scenario).free_running(&scenario).with_gap();
     }
     Some(scenario)
 }

@@ -113,3 +113,46 @@ fn drive(facts: &Facts<'_>, found: &mut Findings, of: fn(Span, Span) -> Span, te
         found.of("T_DP", None);
     }
 }
+
+/// A rotation has time for a message of every active station.
+pub(super) fn rotation(facts: &Facts<'_>, found: &mut Findings) {
+    let (bus, plan) = (&facts.scenario.bus.params, &facts.plan);
+    if plan.visits.is_empty() {
+        return;
+    }
+    let (masters, t_mc) = (plan.visits.len() + 1, plan.longest_high(bus));
+    let least = plan.least_t_tr(bus);
+    let terms = format!("{masters} x (T_TC + T_MC) + T_MC");
+    found.check(Key::bus("t_tr"), bus.t_tr, Relation::AtLeast, (terms, least), || {
+        Fault::new(format!("T_TR = {} leaves some of the {masters} masters no low-priority message", bus.t_tr))
+            .rule(format!(
+                "T_TR >= {masters} x (T_TC {} + T_MC {t_mc}) + T_MC = {least} (felser.ch, token_umlaufzeit)",
+                bus.t_tc()
+            ))
+            .help(format!("t_tr = \"{least}\" or more"))
+    });
+}
+
+/// Whatever the other masters do with the token, it is back before SYNCH.
+pub(super) fn token_in_time(facts: &Facts<'_>, found: &mut Findings) {
+    let (bus, plan, t_dp) = (&facts.scenario.bus.params, &facts.plan, facts.scenario.master.t_dp);
+    if plan.visits.is_empty() {
+        return;
+    }
+    let t_th = plan.t_th(bus, t_dp);
+    let needed = plan.content_at_most(t_th);
+    let longest = plan.longest_t_tr(bus, t_dp).filter(|t_tr| *t_tr >= plan.least_t_tr(bus));
+    found.check(Key::master("t_dp"), t_dp, Relation::AtLeast, ("own content + longest visits", needed), || {
+        Fault::new(format!("the token may come back up to {} late for SYNCH", plan.synch_delay(bus, t_dp)))
+            .rule(format!(
+                "T_DP >= {needed}: each of {} other masters may have the token for T_TH = T_TR - T_DP = {t_th} and the \
+                 message that it began (EN 50170-2, Model: D6)",
+                plan.visits.len()
+            ))
+            .help(match longest {
+                Some(t_tr) => format!("t_tr = \"{t_tr}\" or less, or a longer t_dp"),
+                None => "a longer t_dp".to_owned(),
+            })
+    });
+    found.of("T_DP", None);
+}

@@ -52,11 +52,16 @@ pub(super) fn t_dp_grid(facts: &Facts<'_>, found: &mut Findings) {
 
 pub(super) fn t_dp_content(facts: &Facts<'_>, found: &mut Findings) {
     let (plan, t_dp) = (&facts.plan, facts.scenario.master.t_dp);
-    found.check(T_DP, t_dp, Relation::AtLeast, ("T_DX + GAP + token + SYNCH", plan.content()), || {
+    let visits = plan.content() - plan.own();
+    let terms = if plan.visits.is_empty() { "" } else { " + visits" };
+    let terms = format!("T_DX + GAP + token{terms} + SYNCH");
+    found.check(T_DP, t_dp, Relation::AtLeast, (terms, plan.content()), || {
         let Plan { t_dx, gap, token, synch, .. } = plan;
+        let others =
+            if plan.visits.is_empty() { String::new() } else { format!(" + visits of other masters {visits}") };
         Fault::new(format!("T_DP = {t_dp} cannot hold the cycle of {} slaves", plan.slots.len()))
             .rule(format!(
-                "T_DP >= T_DX {t_dx} + GAP {gap} + token {token} + Global_Control {synch} = {} (manual 3.3.2)",
+                "T_DP >= T_DX {t_dx} + GAP {gap} + token {token}{others} + Global_Control {synch} = {} (manual 3.3.2)",
                 plan.content()
             ))
             .help(shortest_t_dp(facts))
@@ -101,11 +106,11 @@ pub(super) fn t_mapc(facts: &Facts<'_>, found: &mut Findings) {
 }
 
 pub(super) fn watchdog_outlasts_t_dp(facts: &Facts<'_>, found: &mut Findings) {
-    let master = &facts.scenario.master;
+    let (master, cycle) = (&facts.scenario.master, facts.scenario.cycle_symbol());
     let Some(watchdog) = master.watchdog.map(Watchdog::span) else { return };
-    found.check(Key::master("watchdog"), watchdog, Relation::MoreThan, ("T_DP", master.t_dp), || {
+    found.check(Key::master("watchdog"), watchdog, Relation::MoreThan, (cycle, master.t_dp), || {
         Fault::new(format!("a watchdog of {watchdog} runs out in every cycle"))
-            .rule(format!("the watchdog is longer than T_DP = {} (Model: one Data_Exchange per cycle)", master.t_dp))
+            .rule(format!("the watchdog is longer than {cycle} = {} (Model: one Data_Exchange per cycle)", master.t_dp))
             .help("watchdog = \"200 ms\", or \"0 ms\" for none")
     });
 }
@@ -160,7 +165,7 @@ pub(super) fn start_up(facts: &Facts<'_>, found: &mut Findings) {
     let needed = |slave| plan.start_up(facts.scenario, slave, build::set_prm(facts.scenario, slave).len());
     let longest = facts.slaves().map(|slave| (needed(slave), slave)).max_by_key(|&(needed, _)| needed);
     let Some((needed, slave)) = longest else { return };
-    let terms = format!("others, start-up of slave {}, token, SYNCH", slave.address);
+    let terms = format!("with the start-up of slave {}", slave.address);
     found.check(T_DP, t_dp, Relation::AtLeast, (terms, Amount::from(needed)), || {
         Fault::new(format!("T_DP = {t_dp} leaves slave {} no time to start up", slave.address))
             .rule(format!(

@@ -32,11 +32,12 @@ pub(super) fn data_control_time(facts: &Facts<'_>, found: &mut Findings) {
     let master = &facts.scenario.master;
     let least = master.t_dp * LEAST_CONTROL_CYCLES;
     let Some(time) = master.services.data_control_time else { return };
-    let terms = format!("{LEAST_CONTROL_CYCLES} x T_DP");
+    let cycle = facts.scenario.cycle_symbol();
+    let terms = format!("{LEAST_CONTROL_CYCLES} x {cycle}");
     found.check(Key::master("data_control_time"), time, Relation::AtLeast, (terms, least), || {
         Fault::new(format!("a Data_Control_Time of {time} is too short"))
             .rule(format!(
-                "Data_Control_Time >= {LEAST_CONTROL_CYCLES} x T_DP = {least}: the mode is told every third of it, and \
+                "Data_Control_Time >= {LEAST_CONTROL_CYCLES} x {cycle} = {least}: the mode is told every third of it, and \
                  not in every cycle (Model: D5)"
             ))
             .help(format!("data_control_time = \"{least}\" or more"))
