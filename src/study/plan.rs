@@ -15,6 +15,7 @@
 //! | finding | what a rule finds: both sides, the margin, the nearest value that would do |
 //! | rules | the registry of all rules between times; reading a scenario uses the same |
 //! | proposal | a set of values that keeps all rules, with the shortest T_DP |
+//! | written | a proposal as the scenario that was read with other values |
 //! | octets | Set_Prm and Chk_Cfg of every slave, octet by octet |
 //! | page, data | the plan as a page for people and as JSON |
 //! | command | `isodp plan` |
@@ -28,5 +29,7 @@ mod page;
 pub mod proposal;
 pub mod ring;
 pub mod rules;
+mod written;
 
 pub use cycle::*;
+pub use written::written;

@@ -119,13 +119,18 @@ impl Scenario {
         Self::open(path, overrides, Check::ToPlan)
     }
     fn open(path: &Path, overrides: &[(String, String)], check: Check) -> Result<Self, ScenarioError> {
+        let (name, source, text) = Self::text_of(path)?;
+        let dir = path.parent().unwrap_or(Path::new(""));
+        Self::read(&Origin { dir, name: &name, source: &source }, &text, overrides, check)
+    }
+    /// Name, source and text of a file.
+    fn text_of(path: &Path) -> Result<(String, String, String), ScenarioError> {
         let source = path.display().to_string();
         let octets = read_file(path, "scenario", "name one scenario file in it, *.toml")
             .map_err(|fault| ScenarioError::about_file(&source, fault))?;
-        let text = decode(&octets).map_err(|fault| ScenarioError::about_file(&source, fault))?;
+        let text = decode(&octets).map_err(|fault| ScenarioError::about_file(&source, fault))?.to_owned();
         let name = name_of(path).map_err(|fault| ScenarioError::about_file(&source, fault))?;
-        let dir = path.parent().unwrap_or(Path::new(""));
-        Self::read(&Origin { dir, name: &name, source: &source }, text, overrides, check)
+        Ok((name, source, text))
     }
 
     /// Reads `text` as the scenario `name`; messages call it `source`, and GSD files are looked for beside it.
@@ -148,6 +153,28 @@ impl Scenario {
     ) -> Result<Self, ScenarioError> {
         Self::read(&Origin::of_text(name, source), text, overrides, Check::ToPlan)
     }
+    /// As [`Self::parse_to_plan`], and T_DP, T_I and T_O may be missing.
+    ///
+    /// # Errors
+    /// As [`Self::parse_to_plan`] for everything else.
+    pub fn parse_to_propose(
+        name: &str,
+        source: &str,
+        text: &str,
+        overrides: &[(String, String)],
+    ) -> Result<Self, ScenarioError> {
+        Self::read(&Origin::of_text(name, source), text, overrides, Check::ToPropose)
+    }
+    /// Reads the file `path` as [`Self::parse_to_propose`] does, and its text.
+    ///
+    /// # Errors
+    /// As [`Self::parse_to_propose`], and the file cannot be read.
+    pub fn load_to_propose(path: &Path, overrides: &[(String, String)]) -> Result<(Self, String), ScenarioError> {
+        let (name, source, text) = Self::text_of(path)?;
+        let dir = path.parent().unwrap_or(Path::new(""));
+        let origin = Origin { dir, name: &name, source: &source };
+        Ok((Self::read(&origin, &text, overrides, Check::ToPropose)?, text))
+    }
     fn read(
         origin: &Origin<'_>,
         text: &str,
@@ -162,6 +189,7 @@ impl Scenario {
         let source = Source::new(source, text, overrides).in_dir(dir);
         let root = source.parse()?;
         let mut reader = Reader::new(&source);
+        reader.proposes = check == Check::ToPropose;
         let read = read::scenario(&mut reader, root);
         let mut problems = reader.take_problems();
         if let Some(mut scenario) = read.filter(|_| problems.is_empty()) {

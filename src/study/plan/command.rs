@@ -3,9 +3,10 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use super::finding::Finding;
 use super::proposal::Proposal;
 use super::rules::{Facts, Weight};
-use super::{data, octets, page};
+use super::{data, octets, page, written};
 use crate::study::export::{ExportError, Staged};
 use crate::study::plot;
 use crate::study::scenario::{Scenario, ScenarioError};
@@ -55,6 +56,9 @@ pub enum PlanError {
     /// No slave has this address.
     #[error("no slave has the address {0}; the slaves are {1}")]
     NoSlave(u8, String),
+    /// The text of the scenario cannot be changed.
+    #[error("the scenario cannot be written with other values: {0}")]
+    Text(#[from] toml_edit::TomlError),
     /// No proposal keeps the rules.
     #[error("no T_DP, T_I, T_O, T_PLL_W and watchdog keep all rules:\n{0}")]
     NoProposal(String),
@@ -65,13 +69,14 @@ pub enum PlanError {
 /// # Errors
 /// The scenario is wrong, a file cannot be written, or there is no proposal.
 pub fn answer(call: &Call) -> Result<Answer, PlanError> {
+    if call.propose {
+        return propose(call);
+    }
     let scenario = Scenario::load_to_plan(&call.file, &call.sets)?;
     let facts = Facts::of(&scenario);
     let findings = facts.findings();
-    let violated = findings.iter().any(|found| found.rule.weight == Weight::Must && !found.holds());
-    let page = if call.propose {
-        propose(&scenario)?
-    } else if let Some(number) = call.slave {
+    let violated = violated(&findings);
+    let page = if let Some(number) = call.slave {
         octets::text(&scenario, Some(configured(&scenario, number)?))
     } else {
         let dir = call.out.join(&scenario.name);
@@ -81,13 +86,24 @@ pub fn answer(call: &Call) -> Result<Answer, PlanError> {
     Ok(Answer { page, violated })
 }
 
-fn propose(scenario: &Scenario) -> Result<String, PlanError> {
-    let told = |broken: Vec<super::finding::Finding>| {
+/// The proposal, which is itself read as a run reads it before it is told.
+fn propose(call: &Call) -> Result<Answer, PlanError> {
+    let told = |broken: Vec<Finding>| {
         let lines = broken.iter().filter_map(|found| found.fault.as_ref().map(|fault| (found.key, fault)));
         let lines: Vec<_> = lines.map(|(key, fault)| format!("  {key}: {}", super::rules::sentence(fault))).collect();
         PlanError::NoProposal(lines.join("\n"))
     };
-    Ok(Proposal::of(scenario).map_err(told)?.text())
+    let (scenario, text) = Scenario::load_to_propose(&call.file, &call.sets)?;
+    let proposal = Proposal::of(&scenario).map_err(told)?;
+    let page = written(&text, &call.sets, &scenario, &proposal)?;
+    let beside = call.file.with_file_name("proposal.toml").display().to_string();
+    Scenario::parse(&scenario.name, &beside, &page, &[])?;
+    Ok(Answer { page, violated: violated(&Facts::of(&scenario).findings()) })
+}
+
+/// Whether a rule is broken that a run insists on.
+fn violated(findings: &[Finding]) -> bool {
+    findings.iter().any(|found| found.rule.weight == Weight::Must && !found.holds())
 }
 
 fn configured(scenario: &Scenario, number: u8) -> Result<Address, PlanError> {

@@ -47,6 +47,7 @@ struct Cycle {
     t_id2_tbit: u32,
 }
 
+#[expect(clippy::struct_field_names, reason = "every number says its unit")]
 #[derive(Serialize)]
 struct FreeRunning {
     cycle_us: Decimal,
@@ -96,6 +97,7 @@ struct SlaveData {
 }
 
 /// What a slave with a clock has.
+#[expect(clippy::struct_field_names, reason = "every number says its unit")]
 #[derive(Serialize)]
 struct Instants {
     t_i_us: Decimal,

@@ -366,7 +366,7 @@ fn ring(facts: &Facts<'_>, lines: &mut Vec<String>) {
     lines.push(match plan.synch_delay(bus, t_dp) {
         Span::ZERO => format!("the token is back {} before SYNCH or more", t_dp - plan.content_at_most(t_th)),
         late => match plan.longest_t_tr(bus, t_dp) {
-            Some(t_tr) => format!("the token may delay SYNCH by up to {late}; with t_tr = \"{t_tr}\" it does not"),
+            Some(most) => format!("the token may delay SYNCH by up to {late}; with t_tr = \"{most}\" it does not"),
             None => format!("the token may delay SYNCH by up to {late}, whatever T_TR is"),
         },
     });

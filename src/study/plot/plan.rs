@@ -31,10 +31,10 @@ pub fn draw(scenario: &Scenario, planned: &Plan) -> Result<String, PlotError> {
     } else {
         ("Plan: the free-running bus cycle with a GAP poll, to scale", free_running(scenario, planned))
     };
-    let visits: Vec<_> = planned.visits.iter().map(|visit| visit.station.to_string()).collect();
-    let others = match visits.as_slice() {
+    let others = match planned.visits.iter().map(|visit| visit.station.to_string()).collect::<Vec<_>>().as_slice() {
         [] => String::new(),
-        _ => format!(" The visits of the token to the masters {} come after the token.", visits.join(", ")),
+        [one] => format!(" After the token comes its visit to master {one}, which is not drawn."),
+        all => format!(" After the token come its visits to the masters {}, which are not drawn.", all.join(", ")),
     };
     let words = Words {
         title,

@@ -25,6 +25,8 @@ pub(super) enum Check {
     All,
     /// All but the planner's.
     ToPlan,
+    /// The same, and times may be missing.
+    ToPropose,
 }
 
 /// A rule: looks at the facts and complains.

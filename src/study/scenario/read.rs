@@ -370,6 +370,7 @@ fn master(
     let pace = class1::pace(s, reader);
     let powered_at = s.optional(reader, "powered_at", instant).unwrap_or(Span::ZERO);
     let t_dp = match pace {
+        Pace::Synch if reader.proposes && !s.has("t_dp") => Some(Span::from_ms(1)),
         Pace::Synch => s.required(reader, "t_dp", "\"2 ms\"", cycle_time(rate)),
         // The planned cycle, once the slaves are known.
         Pace::Free { .. } => s.optional(reader, "t_dp", cycle_time(rate)).or(Some(Span::ZERO)),
@@ -568,6 +569,9 @@ fn slave(reader: &mut Reader<'_>, from: &SlaveTable, context: &Context<'_>) -> O
 /// The times in force; T_I and T_O must come from the slave or from `[master]`, if that could be read (`master`).
 fn iso_times(reader: &mut Reader<'_>, from: &SlaveTable, times: Times, master: bool) -> Option<IsoTimes> {
     for (key, time, example) in [("t_i", times.t_i, "125 us"), ("t_o", times.t_o, "1 ms")] {
+        if reader.proposes {
+            break;
+        }
         let keys = [format!("master.{key}"), format!("slave.{}.{key}", from.address)];
         let given = keys.iter().any(|key| reader.places.contains_key(key));
         if time.is_none() && !given && master {
@@ -577,9 +581,10 @@ fn iso_times(reader: &mut Reader<'_>, from: &SlaveTable, times: Times, master: b
             reader.complain(reader.place(&["master"]), &keys[0], fault);
         }
     }
+    let missing = reader.proposes.then_some(Span::ZERO);
     Some(IsoTimes {
-        t_i: times.t_i?,
-        t_o: times.t_o?,
+        t_i: times.t_i.or(missing)?,
+        t_o: times.t_o.or(missing)?,
         t_pll_w: times.t_pll_w.unwrap_or(Span::from_us(1)),
         t_pll_d: times.t_pll_d.unwrap_or(Span::ZERO),
     })

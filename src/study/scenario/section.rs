@@ -16,13 +16,15 @@ pub(super) struct Reader<'a> {
     pub(super) places: BTreeMap<String, Place>,
     /// GSD files that were read for it.
     pub(super) gsd_files: super::gsd::Files,
+    /// Whether T_DP, T_I and T_O may be missing: they are to be proposed.
+    pub(super) proposes: bool,
     problems: Vec<(Place, String, Fault)>,
 }
 
 impl<'a> Reader<'a> {
     /// A reader of `source` that has read nothing yet.
     pub(super) const fn new(source: &'a Source<'a>) -> Self {
-        Self { source, places: BTreeMap::new(), gsd_files: BTreeMap::new(), problems: Vec::new() }
+        Self { source, places: BTreeMap::new(), gsd_files: BTreeMap::new(), proposes: false, problems: Vec::new() }
     }
     /// Notes that `key` at `place` is wrong. The same fault of the same value, shared by several slaves, is noted once.
     pub(super) fn complain(&mut self, place: Place, key: &str, fault: Fault) {

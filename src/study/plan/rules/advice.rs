@@ -150,7 +150,7 @@ pub(super) fn token_in_time(facts: &Facts<'_>, found: &mut Findings) {
                 plan.visits.len()
             ))
             .help(match longest {
-                Some(t_tr) => format!("t_tr = \"{t_tr}\" or less, or a longer t_dp"),
+                Some(most) => format!("t_tr = \"{most}\" or less, or a longer t_dp"),
                 None => "a longer t_dp".to_owned(),
             })
     });
