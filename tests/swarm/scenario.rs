@@ -4,6 +4,7 @@
 use std::fmt::Write as _;
 
 use super::draw::Draw;
+use isodp::fdl::params::BusParams;
 use isodp::study::plan::proposal::Proposal;
 use isodp::study::scenario::Scenario;
 use isodp::time::{BitRate, Span};
@@ -89,7 +90,9 @@ pub(super) fn case(seed: u64) -> Result<Case, String> {
     let start_up = cycle * 60;
     let last = start_up + cycle * draw.within(100..=400);
     let (events, token_at_risk) = happenings(draw, &network, cycle, (start_up, last));
-    let asking: Vec<u8> = network.class2.iter().copied().filter(|_| draw.percent(75)).collect();
+    // Connections take seconds to run out: not every network has the time.
+    let share = draw.one(&[0, 0, 80]);
+    let asking: Vec<u8> = network.class2.iter().copied().filter(|_| draw.percent(share)).collect();
     let jobs = jobs(draw, &network, &asking);
     let end = last + cycle * 100_000;
     let run = format!("seed = {}\nduration = \"{} us\"", seed % 1_000, end.ticks() / 12_000);
@@ -156,8 +159,10 @@ fn network(draw: &mut Draw) -> Network {
     let places = places(draw, rate);
     let mut stations = places.text.clone();
     let slaves = slaves(draw, (count, &mut free), (master, &class1), clocked);
-    for slave in &slaves {
-        slave_text(draw, &mut stations, slave, clocked && slave.master == master, &places);
+    for (i, slave) in slaves.iter().enumerate() {
+        // A silent slave publishes nothing and takes no command: only those of others are.
+        let first = i == 0 || slave.master == master;
+        slave_text(draw, &mut stations, slave, (clocked && slave.master == master, first), (&places, rate));
     }
     links(draw, &mut stations, &slaves, master);
     for address in &class1 {
@@ -224,7 +229,8 @@ fn places(draw: &mut Draw, rate: BitRate) -> Places {
             let _ = writeln!(text, "jitter = \"{} ns\"", draw.within(1..=60));
         }
         if kind == "olm" {
-            let _ = writeln!(text, "fibre = \"{} m\"", draw.within(0..=800));
+            let longest = if segments.len() == 2 { 3_500 } else { 800 };
+            let _ = writeln!(text, "fibre = \"{} m\"", draw.within(0..=longest));
         }
     }
     Places { segments, text, cable_m }
@@ -255,7 +261,13 @@ fn slaves(
     (0..count).map(|i| member(i, draw, free)).collect()
 }
 
-fn slave_text(draw: &mut Draw, text: &mut String, slave: &Member, clocked: bool, places: &Places) {
+fn slave_text(
+    draw: &mut Draw,
+    text: &mut String,
+    slave: &Member,
+    (clocked, first): (bool, bool),
+    (places, rate): (&Places, BitRate),
+) {
     let Member { address, master, device, holds } = slave;
     let _ = write!(
         text,
@@ -279,8 +291,17 @@ fn slave_text(draw: &mut Draw, text: &mut String, slave: &Member, clocked: bool,
     if clocked && draw.percent(15) {
         let _ = writeln!(text, "clock_tolerance = {}", draw.within(1..=5));
     }
+    if *device == ENCODERS[0] && draw.percent(25) {
+        let _ = writeln!(text, "t_sdr = \"{} tbit\"", BusParams::profile(rate).max_tsdr.0);
+    }
     if draw.percent(10) {
         text.push_str("ms2_connections = 3\n");
+    }
+    if draw.percent(10) {
+        let _ = writeln!(text, "powered_at = \"{} ms\"", draw.within(1..=60));
+    }
+    if draw.percent(4) && !first {
+        text.push_str("silent = true\n");
     }
 }
 
@@ -388,6 +409,7 @@ fn happenings(draw: &mut Draw, network: &Network, cycle: Span, (from, to): (Span
     };
     let own: Vec<&Member> = network.slaves.iter().filter(|slave| slave.master == network.master).collect();
     let length = (to - from).div_floor(cycle);
+    let mut patched = Vec::new();
     for _ in 0..draw.within(0..=6) {
         let first = draw.within(0..=length - 20);
         // Anywhere in the cycle.
@@ -411,6 +433,7 @@ fn happenings(draw: &mut Draw, network: &Network, cycle: Span, (from, to): (Span
             2 => {
                 let patch = draw.one(&["octets = [[6, 1]]", "length = 3", "octets = [[8, 255], [2, 0]]", ""]);
                 let telegram = draw.one(&["set-prm", "chk-cfg"]);
+                patched.push(slave.address);
                 event(at, &format!("do = \"{telegram}\"\n{patch}\n{whom}"));
                 event(back, &format!("do = \"{telegram}\"\n{whom}"));
             }
@@ -441,7 +464,12 @@ fn happenings(draw: &mut Draw, network: &Network, cycle: Span, (from, to): (Span
             }
         }
     }
-    // The end of all of it.
+    // The end of all of it. What is ordered of a master without supply is not heard.
+    for slave in patched {
+        for telegram in ["set-prm", "chk-cfg"] {
+            event(to - cycle, &format!("do = \"{telegram}\"\nslave = {slave}"));
+        }
+    }
     event(to, "do = \"operate\"");
     event(to, "do = \"control-word\"\nvalue = 0\nslaves = \"all\"");
     event(to, "do = \"acknowledge\"\nslaves = \"all\"");
@@ -464,7 +492,8 @@ fn disturbance(draw: &mut Draw, text: &mut String, network: &Network, (from, to)
     let masters = [&[network.master][..], &network.class1].concat();
     let (whom, risk) = match draw.within(0..=4) {
         0 => (format!("from = {slave}\n"), false),
-        1 => (format!("to = {slave}\n"), false),
+        // A token counts as taken when its next holder is heard: what one asks then may be lost.
+        1 => (format!("to = {slave}\n"), true),
         2 => (format!("from = {slave}\nservice = \"data-exchange\"\n"), false),
         3 => (format!("from = {}\n", draw.one(&masters)), true),
         _ => (String::new(), true),
