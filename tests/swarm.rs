@@ -72,9 +72,11 @@ impl Recorder for Watch {
             Observation::Pll { to, .. } => {
                 self.pll.insert(stamp.station, to);
             }
-            Observation::AcyclicDone { class: MasterClass::Two, result, .. }
-                if matches!(result, AcyclicResult::Positive | AcyclicResult::Negative) =>
-            {
+            Observation::AcyclicDone {
+                class: MasterClass::Two,
+                result: AcyclicResult::Positive | AcyclicResult::Negative,
+                ..
+            } => {
                 self.answered.insert(stamp.station, stamp.at);
             }
             _ => {}
@@ -143,8 +145,8 @@ fn run_on<Q: Queue<NetworkEvent>>(scenario: &Scenario, case: &Case, until: Optio
     };
     let (fingerprints, (rows, watch)) = recorder;
     let (counts, rows) = rows.finish(end);
-    if let Some(pair) = rows.cycles.windows(2).find(|pair| pair[1] != pair[0] + 1) {
-        faults.push(format!("cycle {} comes after cycle {}", pair[1], pair[0]));
+    if let Some(&[one, next]) = rows.cycles.windows(2).find(|pair| pair[1] != pair[0] + 1) {
+        faults.push(format!("cycle {next} comes after cycle {one}"));
     }
     if !endless {
         judge(scenario, case, &network, &watch, &mut faults);

@@ -401,12 +401,9 @@ impl Network {
 /// Events and disturbances between the two instants, and orders at the end that put everything right. Whether the
 /// token is at risk.
 fn happenings(draw: &mut Draw, network: &Network, cycle: Span, (from, to): (Span, Span)) -> (String, bool) {
-    let us = |span: Span| format!("{} us", span.ticks() / 12_000);
     let mut text = String::new();
     let mut at_risk = false;
-    let mut event = |at: Span, what: &str| {
-        let _ = writeln!(text, "[[event]]\nat = \"{}\"\n{what}", us(at));
-    };
+    let mut event = |at: Span, what: &str| order(&mut text, at, what);
     let own: Vec<&Member> = network.slaves.iter().filter(|slave| slave.master == network.master).collect();
     let length = (to - from).div_floor(cycle);
     let mut patched = Vec::new();
@@ -464,19 +461,28 @@ fn happenings(draw: &mut Draw, network: &Network, cycle: Span, (from, to): (Span
             }
         }
     }
-    // The end of all of it. What is ordered of a master without supply is not heard.
-    for slave in patched {
-        for telegram in ["set-prm", "chk-cfg"] {
-            event(to - cycle, &format!("do = \"{telegram}\"\nslave = {slave}"));
-        }
-    }
-    event(to, "do = \"operate\"");
-    event(to, "do = \"control-word\"\nvalue = 0\nslaves = \"all\"");
-    event(to, "do = \"acknowledge\"\nslaves = \"all\"");
+    back_in_order(&mut text, &patched, to, cycle);
     for _ in 0..draw.one(&[0, 0, 1, 2, 3]) {
         at_risk |= disturbance(draw, &mut text, network, (60, 60 + length));
     }
     (text, at_risk)
+}
+
+/// An event at an instant.
+fn order(text: &mut String, at: Span, what: &str) {
+    let _ = writeln!(text, "[[event]]\nat = \"{} us\"\n{what}", at.ticks() / 12_000);
+}
+
+/// The end of all of it. What is ordered of a master without supply is not heard, so that good telegrams come again.
+fn back_in_order(text: &mut String, patched: &[u8], to: Span, cycle: Span) {
+    for slave in patched {
+        for telegram in ["set-prm", "chk-cfg"] {
+            order(text, to - cycle, &format!("do = \"{telegram}\"\nslave = {slave}"));
+        }
+    }
+    order(text, to, "do = \"operate\"");
+    order(text, to, "do = \"control-word\"\nvalue = 0\nslaves = \"all\"");
+    order(text, to, "do = \"acknowledge\"\nslaves = \"all\"");
 }
 
 /// One disturbance within these cycles. Whether it may cost a token.
