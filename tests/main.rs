@@ -25,4 +25,5 @@ mod ring;
 mod scenarios;
 mod startup;
 mod support;
+mod swarm;
 mod topology;

@@ -180,6 +180,8 @@ pub struct Master<A> {
     /// Number of the first cycle since power on.
     begun: u64,
     polling: Polling,
+    /// The token went while SYNCH, or a free-running cycle's start, was on its way: it cannot be called back.
+    bereft: bool,
 }
 
 impl<A: Application> Master<A> {
@@ -208,6 +210,7 @@ impl<A: Application> Master<A> {
             ms1: Client::new(),
             begun: 0,
             polling: Polling::new(),
+            bereft: false,
             settings,
         }
     }
@@ -245,7 +248,7 @@ impl<A: Application> Master<A> {
         self.supervision.restart();
         (self.control_due, self.control_told, self.startup_next) = (true, 0, 0);
         self.active = Active::new(self.settings.address, self.settings.bus);
-        self.part = Part::Starting;
+        (self.part, self.bereft) = (Part::Starting, false);
         self.set_mode(MasterMode::Offline, out);
         self.active.power_on(now, out);
     }
@@ -304,6 +307,12 @@ impl<A: Application> Master<A> {
 
     /// The last bit of SYNCH left at `now`, or the first bit of a free-running master's cycle does: it begins.
     fn clock_sent(&mut self, now: Local, out: &mut Outbox) {
+        self.cycle_begins(now, out);
+        self.exchange(now, 0, out);
+    }
+    /// A cycle has its number even if the token went before its start: slaves hear SYNCH all the same.
+    fn cycle_begins(&mut self, now: Local, out: &mut Outbox) {
+        self.bereft = false;
         let (cycle, nominal) = self.started(now);
         self.t0 = now;
         self.exchange_end = now;
@@ -316,7 +325,6 @@ impl<A: Application> Master<A> {
         }
         self.set_mode(mode, out);
         self.app.cycle(cycle, self.mode, out);
-        self.exchange(now, 0, out);
     }
 
     /// Data_Exchange with the first slave from index `from` on that takes part.
@@ -547,6 +555,7 @@ impl<A: Application> Station for Master<A> {
                 self.confirmed(now, confirm, out);
             }
             Input::Sent if self.part == Part::Clock => self.clock_sent(now, out),
+            Input::Sent if self.bereft => self.cycle_begins(now, out),
             Input::Deadline { timer: Timer::Slot, busy } => {
                 let confirm = self.active.slot_over(now, busy, out);
                 self.count_retry(out);

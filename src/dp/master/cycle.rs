@@ -71,6 +71,7 @@ impl<A: Application> Master<A> {
     }
     /// The token is gone without having been passed: what was under way is given up.
     pub(super) fn token_gone(&mut self, out: &mut Outbox) {
+        self.bereft |= self.part == Part::Clock;
         self.part = Part::Away;
         self.polling.stopped_at = None;
         out.disarm(Timer::Schedule);
