@@ -49,6 +49,9 @@ fn one_device_is_told_in_full() {
         "T_I                  125 us or more, 375 us with octet 15 bit 1",
         "T_PLL_W              up to 20 us; less than 1 us counts as this",
         "resolution           8192 steps in a revolution, 4096 revolutions",
+        "watchdog             in steps of 10 ms or 1 ms",
+        "MS1                  records of up to 240 octets, answered within 10 s",
+        "MS2                  2 connections at a time, records of up to 240 octets, answered within 10 s",
         "P979[3]    shift factor of G1_XIST1",
     ] {
         assert!(all.lines().any(|each| each.split_whitespace().eq(line.split_whitespace())), "{line}\n{all}");

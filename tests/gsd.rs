@@ -337,10 +337,10 @@ fn a_watchdog_in_steps_of_1_ms_needs_slaves_that_have_them() {
     let prm = build::set_prm(&network, &network.slaves[0]);
     assert_eq!((prm[1], prm[2], prm[7]), (25, 1, 0xC4));
     let run = Run::of(&network);
-    let asked = run.telegrams.iter().filter(|(.., octets)| {
+    let mut asked = run.telegrams.iter().filter(|(.., octets)| {
         matches!(isodp::wire::Telegram::parse(octets), Ok(isodp::wire::Telegram::Data { header, .. }) if header.da.get() == 3 && header.sa.get() == 2)
     });
-    let (_, last, ..) = asked.last().expect("a request");
+    let (_, last, ..) = asked.next_back().expect("a request");
     let expired = run.observations.iter().find_map(|(at, who, what)| match what {
         Observation::SlaveState { cause: isodp::observation::SlaveCause::Watchdog, .. } if who.get() == 3 => Some(*at),
         _ => None,

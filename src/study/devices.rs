@@ -3,7 +3,7 @@
 use super::report::aligned;
 use super::scenario::suggestion;
 use crate::device::parameters::{PARAMETERS, Parameter};
-use crate::device::profile::{self, DxbLimits, PROFILES, Profile};
+use crate::device::profile::{self, AcyclicLimits, DxbLimits, PROFILES, Profile};
 use crate::time::{BitRate, Span};
 use crate::wire::parameter;
 
@@ -105,6 +105,11 @@ fn links(profile: &Profile) -> String {
     format!("up to {links}, samples up to {data} octets; subscriber table: slots 1 to {slots} of {data} octets")
 }
 
+/// What acyclic services take of one class of masters.
+fn records(limits: AcyclicLimits) -> String {
+    format!("records of up to {} octets, answered within {}", limits.max_data, limits.response_timeout)
+}
+
 /// What is known of a device, each with its words.
 fn facts(profile: &Profile) -> Vec<(&'static str, String)> {
     let octets: Vec<_> = profile.config.iter().map(|octet| format!("{octet:02X}")).collect();
@@ -125,6 +130,9 @@ fn facts(profile: &Profile) -> Vec<(&'static str, String)> {
         ("function", function(profile).to_owned()),
         ("links", links(profile)),
         ("empty Data_Exchange", if profile.fail_safe { "means Clear (Fail_Safe)" } else { "is refused" }.to_owned()),
+        ("watchdog", if profile.wd_base_1ms { "in steps of 10 ms or 1 ms" } else { "in steps of 10 ms" }.to_owned()),
+        ("MS1", if profile.acyclic { records(profile.c1) } else { "none".to_owned() }),
+        ("MS2", format!("{} connections at a time, {}", profile.ms2_connections, records(profile.c2))),
         ("source", profile.source.to_string()),
     ]
 }

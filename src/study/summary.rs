@@ -514,7 +514,9 @@ fn timing(facts: &Facts, counts: &Counts, histograms: &Histograms) -> Timing {
     let layout = histograms.layout();
     let network = |name| histograms.get(name, Subject::Network);
     let t_dx_max = network("t_dx").and_then(Histogram::max);
-    let t_i = || layout.slaves().iter().map(|slave| slave.t_i);
+    // A slave that runs freely has neither.
+    let clocked = || layout.slaves().iter().zip(&facts.slaves).filter(|(_, facts)| facts.t_o.is_some());
+    let t_i = || clocked().map(|(slave, _)| slave.t_i);
     let t_o = || facts.slaves.iter().filter_map(|slave| slave.t_o);
     Timing {
         t_dp: layout.t_dp,
