@@ -215,7 +215,9 @@ fn analyse(run: &Run, master: u8, owners: &BTreeMap<u8, u8>) -> BTreeMap<u8, Ana
                 last = None;
                 // SYNCH: Control_Command 00, Group_Select 80.
                 if da == 127 && sa == master && octets[9..11] == [0x00, 0x80] {
-                    stations.values_mut().for_each(|station| station.here = 0);
+                    for station in stations.values_mut() {
+                        station.here = 0;
+                    }
                 } else if da != 127 && fc & 0x0F != 9 {
                     let (station, own) = (stations.entry(da).or_default(), owners.get(&da) == Some(&sa));
                     station.request(sa, fc);
@@ -353,15 +355,23 @@ fn what_a_tool_asks_counts_too() {
     }
     let of = |address| list.iter().find(|station| station.address == address).map(figures).expect("a station");
     assert_eq!(of(9)[..3], [1, 0, 2], "two more tokens to the tool, then it is out of the ring");
+    let without = summary(&troubled()).live_list[3];
+    assert_eq!(without.address, 5);
+    assert!(of(5)[4] > without.illegal_responses + 10, "RS to the tool: {:?}", of(5));
     assert!(of(6)[2] > 0 && of(6)[5] > 20, "the tool's repeats and diagnoses: {:?}", of(6));
 }
 
-/// Diagnosis of slave 6 over and over; for some cycles its answers are lost; the tool loses its supply.
+/// Diagnosis of slave 6 over and over, and the inputs of slave 5, which has none while its parameters are wrong; for some cycles its answers are lost; the tool loses its supply.
 const TOOL: &str = r#"[[class2]]
 address = 9
 [[class2.job]]
 service = "diagnosis"
 slave = 6
+start = "50 ms"
+period = "10 ms"
+[[class2.job]]
+service = "rd-inp"
+slave = 5
 start = "50 ms"
 period = "10 ms"
 [[disturbance]]

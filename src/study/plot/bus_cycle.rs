@@ -288,8 +288,13 @@ fn name(bar: &Bar) -> String {
         Kind::Token | Kind::OtherToken => "token".to_owned(),
         Kind::Gap => format!("GAP {slave}"),
         Kind::Acyclic | Kind::OtherAcyclic => format!("acyclic {slave}").trim_end().to_owned(),
-        Kind::Request | Kind::Reply | Kind::DxbReply | Kind::Unreadable => slave,
-        Kind::OtherRequest | Kind::OtherReply | Kind::OtherAnswer => slave,
+        Kind::Request
+        | Kind::Reply
+        | Kind::DxbReply
+        | Kind::Unreadable
+        | Kind::OtherRequest
+        | Kind::OtherReply
+        | Kind::OtherAnswer => slave,
     }
 }
 

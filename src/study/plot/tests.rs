@@ -503,6 +503,7 @@ fn a_fault_of_one_cycle_in_a_long_run_is_seen() {
 
 #[test]
 fn the_kept_bus_cycle_has_a_gap_poll_if_one_was_complete() {
+    use telegrams::Kind::{OtherAcyclic, OtherAnswer, OtherReply, OtherRequest, OtherToken};
     let world = World::new(8, 100, Span::from_ms(2));
     let cycle = world.bus.cycle().unwrap();
     assert_eq!(cycle.number, Some(90));
@@ -510,7 +511,6 @@ fn the_kept_bus_cycle_has_a_gap_poll_if_one_was_complete() {
     assert_eq!(cycle.bars.iter().filter(|bar| bar.kind == telegrams::Kind::Request).count(), 8);
     assert_eq!(cycle.bars.iter().filter(|bar| bar.kind == telegrams::Kind::DxbReply).count(), 1);
     let of_other: Vec<_> = cycle.bars.iter().filter(|bar| bar.other == Some(address(12))).map(|bar| bar.kind).collect();
-    use telegrams::Kind::{OtherAcyclic, OtherAnswer, OtherReply, OtherRequest, OtherToken};
     assert_eq!(of_other, [OtherRequest, OtherReply, OtherAcyclic, OtherAnswer, OtherToken]);
 }
 
