@@ -3,7 +3,9 @@
 use super::acyclic::AcyclicSummary;
 use super::live_list::Seen;
 use super::masters;
-use super::summary::{Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, StationSummary, Summary};
+use super::summary::{
+    Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, StationSummary, Summary, Timing,
+};
 use crate::observation::Leds;
 use crate::time::Span;
 
@@ -44,15 +46,7 @@ fn network(summary: &Summary, lines: &mut Vec<String>) {
         network.duration,
         network.seed
     ));
-    lines.push(format!(
-        "T_DP {}   T_DX {}, leaves {}   T_I {}   T_O {}   spare {}",
-        timing.t_dp,
-        at("up to", timing.t_dx_max),
-        span(timing.left),
-        range(timing.t_i_min, timing.t_i_max),
-        range(timing.t_o_min, timing.t_o_max),
-        at("from", timing.spare_min),
-    ));
+    lines.push(times(timing));
     // The first claim of a run is how the ring begins.
     let lost_tokens = summary.masters.iter().map(|master| master.tokens_claimed).sum::<u64>().saturating_sub(1);
     let masters = summary.live_list.iter().filter(|station| station.seen == Seen::Master);
@@ -347,6 +341,21 @@ pub(super) fn aligned(header: &[&str], left: &[usize], rows: &[Vec<String>]) -> 
 
 fn span(span: Option<Span>) -> String {
     span.map_or_else(|| "-".to_owned(), |span| span.to_string())
+}
+/// The times of the cycle in one line; without SYNCH there are no T_I and T_O.
+fn times(timing: &Timing) -> String {
+    let t_dx = at("up to", timing.t_dx_max);
+    if timing.t_i_min.is_none() && timing.t_o_min.is_none() {
+        return format!("no SYNCH   T_cycle {} planned, with a GAP poll   T_DX {t_dx}", timing.t_dp);
+    }
+    format!(
+        "T_DP {}   T_DX {t_dx}, leaves {}   T_I {}   T_O {}   spare {}",
+        timing.t_dp,
+        span(timing.left),
+        range(timing.t_i_min, timing.t_i_max),
+        range(timing.t_o_min, timing.t_o_max),
+        at("from", timing.spare_min),
+    )
 }
 fn at(word: &str, limit: Option<Span>) -> String {
     limit.map_or_else(|| "-".to_owned(), |limit| format!("{word} {limit}"))

@@ -274,7 +274,7 @@ fn facts(scenario: &Scenario) -> Facts {
         slaves: slaves
             .map(|slave| SlaveFacts {
                 device: slave.device.name.clone().into_owned(),
-                t_o: slave.device.isochronous.then_some(slave.times.t_o),
+                t_o: scenario.is_clocked(slave).then_some(slave.times.t_o),
             })
             .collect(),
         fingerprint: Vec::new(),
