@@ -77,7 +77,7 @@ fn main() {
         let metrics = Metrics::new(layout.clone(), Speeds::of(&scenario), Histograms::new(&layout));
         let mut full = Watched { network, recorder: metrics };
         let mut bare = Watched::new(&scenario, ());
-        let mut prints = Watched::new(&scenario, Fingerprints::default());
+        let mut prints = Watched::new(&scenario, Fingerprints::new(scenario.master.address));
         let [full, straight, bare, prints] = effort.medians(
             number,
             [

@@ -825,7 +825,6 @@ impl Observation {
 
 /// One line in the field's words.
 impl fmt::Display for Observation {
-    #[allow(clippy::too_many_lines, reason = "a line for each observation")]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::CycleStart { cycle, .. } => write!(f, "cycle {cycle} starts"),

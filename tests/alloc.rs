@@ -32,7 +32,7 @@ fn shipped(name: &str, sets: &[(&str, &str)]) -> Scenario {
 fn allocations<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> u64 {
     let layout = run::layout(scenario);
     let histograms = Histograms::new(&layout);
-    let mut recorder = (Fingerprints::default(), Metrics::new(layout, |_, _| 0.0, histograms));
+    let mut recorder = (Fingerprints::new(scenario.master.address), Metrics::new(layout, |_, _| 0.0, histograms));
     let mut network: Network<Node, Q> = build::network(scenario);
     assert!(network.run(Until::Cycle(START), u64::MAX, &mut recorder));
     let info = allocation_counter::measure(|| {

@@ -66,7 +66,7 @@ impl Run {
     pub(crate) fn on<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Self {
         let mut network: Network<Node, Q> = build::network(scenario);
         let rows = Metrics::new(run::layout(scenario), |_, _| 0.0, Self::default());
-        let mut recorder = (Fingerprints::default(), (rows, Log(Self::default())));
+        let mut recorder = (Fingerprints::new(scenario.master.address), (rows, Log(Self::default())));
         let until = match scenario.run.duration {
             Extent::Time(span) => Until::Time(Time::ZERO + span),
             Extent::Cycles(cycles) => Until::Cycle(cycles),

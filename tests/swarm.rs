@@ -119,8 +119,10 @@ fn patience(scenario: &Scenario, case: &Case) -> Span {
 fn run_on<Q: Queue<NetworkEvent>>(scenario: &Scenario, case: &Case, until: Option<Time>) -> Seen {
     let mut network: Network<Node, Q> = build::network(scenario);
     let rows = Metrics::new(run::layout(scenario), |_, _| 0.0, Rows::default());
-    let mut recorder =
-        (Fingerprints::default(), (rows, Watch { master: Some(scenario.master.address), ..Watch::default() }));
+    let mut recorder = (
+        Fingerprints::new(scenario.master.address),
+        (rows, Watch { master: Some(scenario.master.address), ..Watch::default() }),
+    );
     // Every telegram has three characters and its idle time, and no station does more than a few things about it.
     let telegrams = case.cycle.div_floor(scenario.bus.params.rate.bit()) / 66;
     let budget = scenario.stations().count() as u64 * (telegrams as u64 * 2 + 20) + 100;

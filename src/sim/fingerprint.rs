@@ -82,18 +82,18 @@ impl Station {
 /// Takes the fingerprints of a run.
 #[derive(Clone)]
 pub struct Fingerprints {
+    /// The master whose cycles are counted; others number their own.
+    master: Address,
     stations: Vec<Option<Station>>,
     checkpoints: Vec<(u64, Fingerprint)>,
     stride: u64,
 }
 
-impl Default for Fingerprints {
-    fn default() -> Self {
-        Self { stations: vec![None; 128], checkpoints: Vec::with_capacity(CHECKPOINTS + 1), stride: 1 }
-    }
-}
-
 impl Fingerprints {
+    /// Nothing seen yet of a run whose cycles are those of `master`.
+    pub fn new(master: Address) -> Self {
+        Self { master, stations: vec![None; 128], checkpoints: Vec::with_capacity(CHECKPOINTS + 1), stride: 1 }
+    }
     fn station(&mut self, address: Address) -> &mut Station {
         self.stations[usize::from(address.get())].get_or_insert_default()
     }
@@ -144,7 +144,8 @@ impl Recorder for Fingerprints {
     }
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         match what {
-            Observation::CycleStart { cycle, .. } => self.checkpoint(*cycle),
+            Observation::CycleStart { cycle, .. } if stamp.station == self.master => self.checkpoint(*cycle),
+            Observation::CycleStart { .. } => {}
             Observation::Latch { locked, inputs } => {
                 let latches = &mut self.station(stamp.station).latches;
                 latches.instant(stamp.at);
@@ -169,6 +170,8 @@ mod tests {
     use crate::sim::crystal::Crystal;
     use crate::time::{Local, Span};
 
+    const MASTER: Address = Address::new(2).unwrap();
+
     fn send(all: &mut Fingerprints, sender: u8, octets: &[u8]) {
         let start = Time::ZERO + Span::from_us(1);
         let sender = Address::new(sender).unwrap();
@@ -177,7 +180,7 @@ mod tests {
 
     #[test]
     fn a_further_station_changes_nothing_for_the_others() {
-        let [mut one, mut two] = [Fingerprints::default(), Fingerprints::default()];
+        let [mut one, mut two] = [Fingerprints::new(MASTER), Fingerprints::new(MASTER)];
         send(&mut one, 3, &[1, 2]);
         send(&mut two, 3, &[1, 2]);
         send(&mut two, 4, &[5]);
@@ -188,7 +191,7 @@ mod tests {
 
     #[test]
     fn one_octet_shows() {
-        let [mut one, mut two] = [Fingerprints::default(), Fingerprints::default()];
+        let [mut one, mut two] = [Fingerprints::new(MASTER), Fingerprints::new(MASTER)];
         send(&mut one, 3, &[1, 2]);
         send(&mut two, 3, &[1, 3]);
         assert_ne!(one.total(), two.total());
@@ -196,11 +199,14 @@ mod tests {
 
     #[test]
     fn checkpoints_stay_few_and_evenly_spread() {
-        let mut all = Fingerprints::default();
+        let mut all = Fingerprints::new(MASTER);
         let crystal = Crystal::new(0, Local::ZERO).unwrap();
-        let stamp = Stamp { at: Time::ZERO, station: Address::new(2).unwrap(), crystal: &crystal };
+        let stamp = Stamp { at: Time::ZERO, station: MASTER, crystal: &crystal };
+        let other = Stamp { station: Address::new(1).unwrap(), ..stamp };
         for cycle in 0..10_000 {
             all.observe(stamp, &Observation::CycleStart { cycle, nominal: Local::ZERO });
+            // Another master counts cycles of its own.
+            all.observe(other, &Observation::CycleStart { cycle: cycle / 3, nominal: Local::ZERO });
         }
         let cycles: Vec<u64> = all.checkpoints().iter().map(|&(cycle, _)| cycle).collect();
         assert!(cycles.len() <= CHECKPOINTS && cycles.len() > CHECKPOINTS / 4);

@@ -149,7 +149,7 @@ pub fn run<Q: Queue<NetworkEvent>>(
     let bus = draws.then(|| BusCycle::new(scenario.master.address));
 
     let mut network: Network<Node, Q> = build::network(scenario);
-    let mut recorder = (Fingerprints::default(), (metrics, bus));
+    let mut recorder = (Fingerprints::new(scenario.master.address), (metrics, bus));
     let end = until(scenario);
     while !network.run(end, STRIDE, &mut recorder) {
         watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
