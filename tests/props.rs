@@ -262,7 +262,7 @@ struct Bursts {
 }
 impl std::fmt::Display for Bursts {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        writeln!(f, "count = {}", self.count)?;
+        writeln!(f, "for = {}", self.count)?;
         self.every.map_or(Ok(()), |every| writeln!(f, "every = {every}"))
     }
 }
