@@ -22,5 +22,6 @@ pub mod run;
 #[cfg(test)]
 mod sample;
 pub mod scenario;
+pub mod statistics;
 pub mod summary;
 pub mod topology;
