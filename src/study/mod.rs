@@ -23,5 +23,6 @@ pub mod run;
 #[cfg(test)]
 mod sample;
 pub mod scenario;
+pub mod statistics;
 pub mod summary;
 pub mod topology;
