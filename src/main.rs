@@ -14,7 +14,7 @@ use isodp::study::plan::command::{Call, answer};
 use isodp::study::plan::rules::warnings;
 use isodp::study::replay::{Window, replay};
 use isodp::study::run::{Outcome, Progress, run};
-use isodp::study::scenario::{Extent, Scenario};
+use isodp::study::scenario::{Extent, Scenario, disturbance};
 use isodp::study::{devices, report};
 use isodp::time::Span;
 
@@ -66,6 +66,8 @@ enum Command {
     Replay(ReplayArgs),
     /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
+    /// Lists the disturbances that a scenario can name, with their keys and an example of each.
+    Disturbances,
     /// Shows what a GSD file says, what of it is ignored and what does not fit.
     #[command(after_help = GSD_CODES)]
     Gsd(GsdArgs),
@@ -159,6 +161,7 @@ fn main() -> ExitCode {
         Command::Plan(args) => plan_command(args),
         Command::Replay(args) => replay_command(args).map(done),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
+        Command::Disturbances => Ok(done(disturbance::list())),
         Command::Gsd(args) => gsd_command(&args.file),
     };
     match result.and_then(|(page, code)| show(&page).map(|()| code)) {

@@ -9,6 +9,7 @@ mod acyclic;
 mod check;
 mod class1;
 mod class2;
+pub mod disturbance;
 pub mod error;
 #[cfg(test)]
 mod faults;
@@ -34,7 +35,9 @@ use crate::device::profile::Device;
 use crate::dp::handler::{Patch, StartupTelegram};
 pub use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
-pub use crate::sim::fault::{Bursts, Disturbance, Service};
+pub use crate::sim::fault::line::{LineFault, Service};
+pub use crate::sim::fault::window::{Bursts, Window};
+pub use crate::sim::fault::{Disturbance, What};
 use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
 use crate::time::{Span, Tbit};
