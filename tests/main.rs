@@ -25,6 +25,7 @@ mod rig;
 mod ring;
 mod scenarios;
 mod startup;
+mod statistics;
 mod support;
 mod swarm;
 mod topology;
