@@ -10,6 +10,7 @@ mod check;
 mod class1;
 mod class2;
 pub mod error;
+mod expect;
 #[cfg(test)]
 mod faults;
 mod gsd;
@@ -37,6 +38,7 @@ use crate::fdl::params::BusParams;
 pub use crate::sim::fault::{Bursts, Disturbance, Service};
 use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
+use crate::study::verdict::Expectation;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
 use crate::wire::control::GlobalControl;
@@ -80,6 +82,8 @@ pub struct Scenario {
     pub disturbances: Vec<Disturbance>,
     /// What to keep.
     pub record: Record,
+    /// What is expected of the run's figures, in the order of the file.
+    pub expectations: Vec<Expectation>,
 }
 
 /// Where the text of a scenario comes from.
@@ -683,6 +687,7 @@ pub(crate) mod tests {
                 tables: CsvTable::ALL.iter().map(|&(_, table)| table).collect(),
                 rows: 20_000,
             },
+            expectations: Vec::new(),
         }
     }
 
