@@ -5,6 +5,7 @@ pub mod acyclic;
 pub mod build;
 pub mod count;
 pub mod devices;
+pub mod episode;
 pub mod event_budget;
 pub mod export;
 pub mod gsd;
