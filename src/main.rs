@@ -14,7 +14,7 @@ use isodp::study::plan::command::{Call, answer};
 use isodp::study::plan::rules::warnings;
 use isodp::study::replay::{Window, replay};
 use isodp::study::run::{Outcome, Progress, layout, run};
-use isodp::study::scenario::{Extent, Scenario};
+use isodp::study::scenario::{Extent, Scenario, disturbance};
 use isodp::study::{devices, figure, report};
 use isodp::time::Span;
 
@@ -66,6 +66,8 @@ enum Command {
     Replay(ReplayArgs),
     /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
+    /// Lists the disturbances that a scenario can name, with their keys and an example of each.
+    Disturbances,
     /// Lists the figures that a run can be asked for by name: all families, or the names of one scenario.
     Figures(FiguresArgs),
     /// Shows what a GSD file says, what of it is ignored and what does not fit.
@@ -168,6 +170,7 @@ fn main() -> ExitCode {
         Command::Plan(args) => plan_command(args),
         Command::Replay(args) => replay_command(args).map(done),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
+        Command::Disturbances => Ok(done(disturbance::list())),
         Command::Figures(args) => figures_command(args.scenario.as_deref()).map(done),
         Command::Gsd(args) => gsd_command(&args.file),
     };

@@ -8,6 +8,7 @@ mod dp_services;
 mod dxb;
 mod encoder;
 mod encoder_scenarios;
+mod episodes;
 mod figures;
 mod foreign;
 mod golden;

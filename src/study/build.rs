@@ -16,6 +16,7 @@ use crate::dp::master::{Master, Pace, Settings};
 use crate::dp::ms2::{self, client};
 use crate::observation::MasterMode;
 use crate::sim::crystal::Crystal;
+use crate::sim::fault::Faults;
 use crate::sim::motion::{self, Shaft};
 use crate::sim::network::{self, Act, Network, NetworkEvent, Site, Wiring};
 use crate::sim::noise::{JitterSource, LinkJitter, Purpose, Stream};
@@ -187,7 +188,7 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
     let mut network =
-        Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, scenario.disturbances.clone());
+        Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, Faults::new(&scenario.disturbances));
     for event in &scenario.events {
         let when = match event.when {
             When::Time(span) => network::When::Time(Time::ZERO + span),

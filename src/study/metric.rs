@@ -382,6 +382,7 @@ impl Watch {
 mod tests {
     use super::*;
     use crate::observation::{Inputs, SlaveCause};
+    use crate::sim::record::Origin;
     use crate::study::sample::{self, address};
 
     /// Keeps every row.
@@ -442,8 +443,13 @@ mod tests {
         }
         fn reply(&mut self, ns: i64, station: u8, destination: u8) {
             let octets = [0x68, 4, 4, 0x68, destination, station, 0x08, 0, 0, 0x16];
-            let telegram =
-                Transmission { start: at(ns), end: at(ns + 9_000), sender: address(station), octets: &octets };
+            let telegram = Transmission {
+                start: at(ns),
+                end: at(ns + 9_000),
+                sender: address(station),
+                octets: &octets,
+                origin: Origin::Sender,
+            };
             self.metrics.telegram(&telegram);
         }
         fn over(self, ns: i64) -> (Counts, Kept) {

@@ -5,6 +5,8 @@ pub mod acyclic;
 pub mod build;
 pub mod count;
 pub mod devices;
+pub mod episode;
+pub mod event_budget;
 pub mod export;
 pub mod figure;
 pub mod gsd;
@@ -23,6 +25,7 @@ pub mod run;
 #[cfg(test)]
 mod sample;
 pub mod scenario;
+pub mod statistics;
 pub mod summary;
 pub mod topology;
 pub mod verdict;

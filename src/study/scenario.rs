@@ -9,6 +9,7 @@ mod acyclic;
 mod check;
 mod class1;
 mod class2;
+pub mod disturbance;
 pub mod error;
 mod expect;
 #[cfg(test)]
@@ -35,7 +36,9 @@ use crate::device::profile::Device;
 use crate::dp::handler::{Patch, StartupTelegram};
 pub use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
-pub use crate::sim::fault::{Bursts, Disturbance, Service};
+pub use crate::sim::fault::line::{LineFault, Service};
+pub use crate::sim::fault::window::{Bursts, Window};
+pub use crate::sim::fault::{Disturbance, What};
 use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
 use crate::study::verdict::Expectation;
@@ -285,6 +288,8 @@ pub struct Run {
     pub seed: u64,
     /// Where the run ends.
     pub duration: Extent,
+    /// Events per T_DP beyond which a run makes no headway, at least 1; none is what the bits of a T_DP allow.
+    pub max_events: Option<u64>,
 }
 
 impl Run {
@@ -650,7 +655,7 @@ pub(crate) mod tests {
         Scenario {
             name: "network".into(),
             question: String::new(),
-            run: Run { seed: 1, duration: Extent::Cycles(1_000) },
+            run: Run { seed: 1, duration: Extent::Cycles(1_000), max_events: None },
             bus: Bus { params: BusParams::profile(rate), cable_mm: 0 },
             topology: Topology::line(0),
             master: Master {

@@ -8,6 +8,7 @@ use super::value::{Unit, Value};
 use crate::observation::{AcyclicResult, MasterMode, Phase, PllState, SlaveState};
 use crate::study::acyclic::ClassCounts;
 use crate::study::count::{LinkCounts, Moment, Rotation, SlaveCounts};
+use crate::study::episode::{Harm, SlaveEpisodes, Spread};
 use crate::study::histogram::Subject;
 use crate::study::live_list::{CycleTimes, Station};
 use crate::study::masters::MasterCounts;
@@ -39,6 +40,8 @@ pub enum Of {
     Slave(fn(&SlaveCounts) -> Option<Value>),
     /// A slave, by the code of a fault.
     SlaveFault(fn(&SlaveCounts, u16) -> Option<Value>),
+    /// A slave's episodes.
+    Episodes(fn(&SlaveEpisodes) -> Option<Value>),
     /// Any station of the live list; slaves and masters have it too.
     Station(fn(&Station) -> Option<Value>),
     /// A master, where several share the token.
@@ -89,6 +92,19 @@ fn last_change(figures: &Figures) -> Option<Value> {
     let slaves = figures.counts.slaves.iter().map(|slave| slave.last_change);
     instant(slaves.chain([figures.counts.network.last_mode]).max().flatten())
 }
+/// From a disturbance to a fault of any code.
+fn to_fault(slave: &SlaveEpisodes) -> Spread {
+    let faults = slave.to_harm.iter().filter(|(harm, _)| matches!(harm, Harm::Fault(_)));
+    faults.fold(Spread::default(), |all, (_, times)| all.merged(*times))
+}
+/// From the end of full operation to the next, whatever ended it.
+fn recovery(slave: &SlaveEpisodes) -> Spread {
+    slave.recovery.values().fold(Spread::default(), |all, times| all.merged(*times))
+}
+/// The same of all slaves.
+fn all(figures: &Figures, of: fn(&SlaveEpisodes) -> Spread) -> Spread {
+    figures.episodes.slaves().iter().map(of).fold(Spread::default(), Spread::merged)
+}
 /// The one family that can be below zero: T_DP minus the longest T_DX.
 pub(super) const LEFT: &str = "left_after_t_dx";
 fn left(figures: &Figures) -> Option<Value> {
@@ -134,6 +150,16 @@ pub const FAMILIES: &[Family] = &[
     Family { name: "syncs", unit: Unit::Count, what: "how often slaves were brought into data exchange", source: "live list", of: Of::Network(|f| stations(f, |station| station.syncs)) },
     Family { name: "repeats", unit: Unit::Count, what: "requests and tokens that any master repeated", source: "live list", of: Of::Network(|f| stations(f, |station| station.repeats)) },
     Family { name: "illegal_responses", unit: Unit::Count, what: "answers that do not fit their request", source: "live list", of: Of::Network(|f| stations(f, |station| station.illegal)) },
+    Family { name: "time_to_fault.count", unit: Unit::Count, what: "how many times from a disturbance to a fault there are, all slaves", source: "Model: episodes", of: Of::Network(|f| count(all(f, to_fault).count)) },
+    Family { name: "time_to_fault.min", unit: Unit::Ms, what: "shortest of the times from a disturbance to a fault, all slaves", source: "Model: episodes", of: Of::Network(|f| span(all(f, to_fault).min())) },
+    Family { name: "time_to_fault.mean", unit: Unit::Ms, what: "mean of the times from a disturbance to a fault, to the tick below, all slaves", source: "Model: episodes", of: Of::Network(|f| span(all(f, to_fault).mean())) },
+    Family { name: "time_to_fault.max", unit: Unit::Ms, what: "longest of the times from a disturbance to a fault, all slaves", source: "Model: episodes", of: Of::Network(|f| span(all(f, to_fault).max())) },
+    Family { name: "recovery.count", unit: Unit::Count, what: "how many times from the end of full operation to the next there are, all slaves", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| count(all(f, recovery).count)) },
+    Family { name: "recovery.min", unit: Unit::Ms, what: "shortest of the times from the end of full operation to the next, all slaves", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| span(all(f, recovery).min())) },
+    Family { name: "recovery.mean", unit: Unit::Ms, what: "mean of the times from the end of full operation to the next, to the tick below, all slaves", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| span(all(f, recovery).mean())) },
+    Family { name: "recovery.max", unit: Unit::Ms, what: "longest of the times from the end of full operation to the next, all slaves", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| span(all(f, recovery).max())) },
+    Family { name: "losses", unit: Unit::Count, what: "how often slaves lost full operation", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| count(f.episodes.slaves().iter().map(|slave| slave.losses).sum())) },
+    Family { name: "unrecovered", unit: Unit::Count, what: "slaves that lost full operation and are without it at the end", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| count(f.episodes.slaves().iter().filter(|slave| slave.lasting.is_some()).count() as u64)) },
 
     Family { name: "in_operation", unit: Unit::Truth, what: "whether it is in cyclic operation at the end", source: "manual 2.1.5", of: Of::Slave(|s| truth(in_operation(s))) },
     Family { name: "exchanging", unit: Unit::Truth, what: "whether it is in DATA_EXCH at the end", source: "EN 50170-2", of: Of::Slave(|s| truth(s.state == SlaveState::DataExch)) },
@@ -158,6 +184,15 @@ pub const FAMILIES: &[Family] = &[
     Family { name: "retries", unit: Unit::Count, what: "requests to it that the master repeated", source: "Model: D7", of: Of::Slave(|s| count(s.retries)) },
     Family { name: "no_answers", unit: Unit::Count, what: "requests to it without answer after all retries", source: "Model: D7", of: Of::Slave(|s| count(s.no_answers)) },
     Family { name: "diagnoses", unit: Unit::Count, what: "times that it asked for Slave_Diag during data exchange (DH)", source: "EN 50170-2", of: Of::Slave(|s| count(s.diagnoses)) },
+    Family { name: "time_to_fault.count", unit: Unit::Count, what: "how many times from a disturbance to a fault there are", source: "Model: episodes", of: Of::Episodes(|s| count(to_fault(s).count)) },
+    Family { name: "time_to_fault.min", unit: Unit::Ms, what: "shortest of the times from a disturbance to a fault", source: "Model: episodes", of: Of::Episodes(|s| span(to_fault(s).min())) },
+    Family { name: "time_to_fault.mean", unit: Unit::Ms, what: "mean of the times from a disturbance to a fault, to the tick below", source: "Model: episodes", of: Of::Episodes(|s| span(to_fault(s).mean())) },
+    Family { name: "time_to_fault.max", unit: Unit::Ms, what: "longest of the times from a disturbance to a fault", source: "Model: episodes", of: Of::Episodes(|s| span(to_fault(s).max())) },
+    Family { name: "recovery.count", unit: Unit::Count, what: "how many times from the end of full operation to the next there are", source: "manual 2.1.5, Model: episodes", of: Of::Episodes(|s| count(recovery(s).count)) },
+    Family { name: "recovery.min", unit: Unit::Ms, what: "shortest of the times from the end of full operation to the next", source: "manual 2.1.5, Model: episodes", of: Of::Episodes(|s| span(recovery(s).min())) },
+    Family { name: "recovery.mean", unit: Unit::Ms, what: "mean of the times from the end of full operation to the next, to the tick below", source: "manual 2.1.5, Model: episodes", of: Of::Episodes(|s| span(recovery(s).mean())) },
+    Family { name: "recovery.max", unit: Unit::Ms, what: "longest of the times from the end of full operation to the next", source: "manual 2.1.5, Model: episodes", of: Of::Episodes(|s| span(recovery(s).max())) },
+    Family { name: "losses", unit: Unit::Count, what: "how often it lost full operation", source: "manual 2.1.5, Model: episodes", of: Of::Episodes(|s| count(s.losses)) },
 
     Family { name: "lost", unit: Unit::Count, what: "how often it left data exchange, or as master the ring, against its master's will", source: "live list", of: Of::Station(|s| count(s.lost)) },
     Family { name: "syncs", unit: Unit::Count, what: "how often it was brought into data exchange", source: "live list", of: Of::Station(|s| count(s.syncs)) },

@@ -38,6 +38,7 @@ pub use value::{Unit, Value};
 use core::cmp::Ordering;
 
 use super::count::Counts;
+use super::episode::Episodes;
 use super::histogram::{self, Histograms};
 use super::layout::Layout;
 use name::What;
@@ -47,12 +48,13 @@ use name::What;
 pub struct Figures {
     counts: Counts,
     histograms: Histograms,
+    episodes: Episodes,
 }
 
 impl Figures {
     /// The figures of what a run counted and recorded.
-    pub const fn new(counts: Counts, histograms: Histograms) -> Self {
-        Self { counts, histograms }
+    pub const fn new(counts: Counts, histograms: Histograms, episodes: Episodes) -> Self {
+        Self { counts, histograms, episodes }
     }
     /// What was counted.
     pub const fn counts(&self) -> &Counts {
@@ -61,6 +63,10 @@ impl Figures {
     /// What was recorded.
     pub const fn histograms(&self) -> &Histograms {
         &self.histograms
+    }
+    /// What became of disturbances.
+    pub const fn episodes(&self) -> &Episodes {
+        &self.episodes
     }
     /// The network that these are of.
     pub fn layout(&self) -> &Layout {
@@ -141,6 +147,9 @@ impl Figures {
             (family::Of::NetworkFault(of), Subject::Network) => of(self, code),
             (family::Of::Slave(of), Subject::Slave(address)) => of(slave(address)?),
             (family::Of::SlaveFault(of), Subject::Slave(address)) => of(slave(address)?, code),
+            (family::Of::Episodes(of), Subject::Slave(address)) => {
+                of(self.episodes.slaves().iter().find(|slave| slave.address == address)?)
+            }
             (
                 family::Of::Station(of),
                 Subject::Slave(address) | Subject::Master(address) | Subject::Station(address),

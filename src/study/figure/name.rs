@@ -82,7 +82,7 @@ impl Scope {
     fn has(self, of: family::Of) -> bool {
         match of {
             family::Of::Network(_) | family::Of::NetworkFault(_) => self == Self::Network,
-            family::Of::Slave(_) | family::Of::SlaveFault(_) => self == Self::Slave,
+            family::Of::Slave(_) | family::Of::SlaveFault(_) | family::Of::Episodes(_) => self == Self::Slave,
             family::Of::Station(_) => matches!(self, Self::Station | Self::Slave | Self::Master),
             family::Of::Master(_) => self == Self::Master,
             family::Of::Link(_) => self == Self::Link,

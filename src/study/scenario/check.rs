@@ -10,7 +10,7 @@ use super::section::Reader;
 use super::services;
 use super::topology;
 use super::tree::Place;
-use super::{Action, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Sample, Scenario, Slave, When};
+use super::{Action, CodeSequence, Crystal, Extent, LineFault, Link, Run, Sample, Scenario, Slave, What, When};
 use crate::device::options::Resolution;
 use crate::sim::motion;
 use crate::study::plan::finding::{Finding, Subject};
@@ -492,7 +492,7 @@ fn event_instants(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
-        let Disturbance::LostTelegrams { from, to, .. } = disturbance else { continue };
+        let What::Line(LineFault::LostTelegrams { from, to, .. }) = &disturbance.what else { continue };
         for (key, station) in [("from", from), ("to", to)] {
             if let Some(address) = *station
                 && address != facts.scenario.master.address
