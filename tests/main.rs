@@ -27,3 +27,4 @@ mod startup;
 mod support;
 mod swarm;
 mod topology;
+mod what_if;
