@@ -8,6 +8,7 @@ mod dp_services;
 mod dxb;
 mod encoder;
 mod encoder_scenarios;
+mod episodes;
 mod foreign;
 mod golden;
 mod gsd;

@@ -6,6 +6,8 @@ pub mod build;
 pub mod count;
 pub mod devices;
 pub mod difference;
+pub mod episode;
+pub mod event_budget;
 pub mod export;
 pub mod gsd;
 pub mod histogram;
@@ -23,6 +25,7 @@ pub mod run;
 #[cfg(test)]
 mod sample;
 pub mod scenario;
+pub mod statistics;
 pub mod summary;
 pub mod topology;
 pub mod what_if;

@@ -24,6 +24,7 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     masters(summary, &mut lines);
     slaves(summary, &mut lines);
     leds(summary, &mut lines);
+    episodes(summary, &mut lines);
     live_list(summary, &mut lines);
     spread(summary, &mut lines);
     links(summary, &mut lines);
@@ -158,6 +159,14 @@ fn leds(summary: &Summary, lines: &mut Vec<String>) {
             let LedSummary { red, green, meaning } = leds;
             lines.push(format!("LEDs red {red}, green {green} at slave {}: {meaning}", ranges(&slaves)));
         }
+    }
+}
+
+/// How long disturbances took to harm, and slaves to recover.
+fn episodes(summary: &Summary, lines: &mut Vec<String>) {
+    if let Some(episodes) = &summary.episodes {
+        lines.push(String::new());
+        lines.extend(episodes.lines());
     }
 }
 

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::build;
 use super::count::Counts;
+use super::episode::Episodes;
+use super::event_budget::{EventBudget, NoHeadway};
 use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, MasterLayout, SlaveLayout};
@@ -24,8 +26,6 @@ use crate::sim::queue::Queue;
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
-/// Events between two looks at the progress.
-const STRIDE: u64 = 50_000;
 /// File of the topology in text.
 const TOPOLOGY: &str = "topology.txt";
 /// Bins of a histogram in a picture.
@@ -61,6 +61,9 @@ pub enum RunError {
     /// A table, log or summary could not be written.
     #[error(transparent)]
     Export(#[from] ExportError),
+    /// It makes no headway.
+    #[error(transparent)]
+    NoHeadway(#[from] NoHeadway),
     /// A picture could not be written.
     #[error(transparent)]
     Plot(#[from] PlotError),
@@ -92,6 +95,7 @@ impl Shafts for Speeds {
 /// Everything that takes rows.
 struct Sinks {
     histograms: Histograms,
+    episodes: Episodes,
     exports: Option<Exports>,
     plots: Option<Plots>,
 }
@@ -103,6 +107,7 @@ impl Sink for Sinks {
     }
     fn slave(&mut self, row: &super::row::SlaveRow) {
         self.histograms.slave(row);
+        self.episodes.slave(row);
         self.exports.slave(row);
         self.plots.slave(row);
     }
@@ -113,6 +118,7 @@ impl Sink for Sinks {
     }
     fn event(&mut self, row: &super::row::EventRow) {
         self.histograms.event(row);
+        self.episodes.event(row);
         self.exports.event(row);
         self.plots.event(row);
     }
@@ -134,7 +140,7 @@ pub const fn until(scenario: &Scenario) -> Until {
 pub fn run<Q: Queue<NetworkEvent>>(
     scenario: &Scenario,
     out: Option<&Path>,
-    mut watch: impl FnMut(Progress),
+    watch: impl FnMut(Progress),
 ) -> Result<Outcome, RunError> {
     let dir = out.filter(|_| scenario.record.files).map(|out| out.join(&scenario.name));
     let layout = layout(scenario);
@@ -144,19 +150,18 @@ pub fn run<Q: Queue<NetworkEvent>>(
     });
     let draws = dir.is_some() && scenario.record.plots;
     let plots = draws.then(|| Plots::new(meta(scenario, &layout)));
-    let sinks = Sinks { histograms: Histograms::new(&layout), exports: exports.transpose()?, plots };
+    let clocked = |slave| scenario.slave(slave).is_some_and(|slave| scenario.is_clocked(slave));
+    let episodes = Episodes::new(&layout, clocked);
+    let sinks = Sinks { histograms: Histograms::new(&layout), episodes, exports: exports.transpose()?, plots };
     let metrics = Metrics::new(layout, Speeds::of(scenario), sinks);
     let bus = draws.then(|| BusCycle::new(scenario.master.address));
 
     let mut network: Network<Node, Q> = build::network(scenario);
     let mut recorder = (Fingerprints::new(scenario.master.address), (metrics, bus));
-    let end = until(scenario);
-    while !network.run(end, STRIDE, &mut recorder) {
-        watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
-    }
-    watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
+    EventBudget::of(scenario).run(&mut network, scenario, &mut recorder, watch)?;
     let (fingerprints, (metrics, bus)) = recorder;
-    let (counts, sinks) = metrics.finish(network.now());
+    let (counts, mut sinks) = metrics.finish(network.now());
+    sinks.episodes.finish(network.now());
 
     let summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
     conclude(scenario, summary, &counts, sinks, (&fingerprints, bus.as_ref()), dir)
@@ -185,6 +190,7 @@ fn conclude(
     summary.show_leds(counts);
     summary.show_receptions(counts);
     summary.show_acyclic(counts);
+    summary.show_episodes(&sinks.episodes);
     let map = Map::of(scenario);
     if scenario.topology.has_segments() {
         summary.topology = map.text(false);

@@ -4,6 +4,7 @@ use serde::{Serialize, Serializer};
 
 use super::acyclic::AcyclicSummary;
 use super::count::{Counts, LinkCounts, SlaveCounts};
+use super::episode::{EpisodeSummary, Episodes};
 use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
@@ -46,6 +47,10 @@ pub struct Summary {
     /// Acyclic services per class of master; none before [`Summary::show_acyclic`].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub acyclic: Vec<AcyclicSummary>,
+    /// From disturbances to faults, and back to full operation; none before [`Summary::show_episodes`] and where no slave
+    /// was harmed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub episodes: Option<EpisodeSummary>,
     /// Name and text of each fingerprint.
     #[serde(serialize_with = "map")]
     pub fingerprint: Vec<(String, String)>,
@@ -436,6 +441,7 @@ impl Summary {
             links: layout.links().iter().map(link).collect(),
             live_list: counts.live_list.stations().filter_map(StationSummary::of).collect(),
             acyclic: Vec::new(),
+            episodes: None,
             network: Network {
                 scenario: facts.scenario,
                 bit_rate: facts.bit_rate.text(),
@@ -474,6 +480,12 @@ impl Summary {
     /// stays comparable with that of runs before they were counted.
     pub fn show_acyclic(&mut self, counts: &Counts) {
         self.acyclic = AcyclicSummary::all(&counts.acyclic);
+    }
+
+    /// Adds the episodes. What they are made of is in the fingerprint of the states; the hash of all figures stays
+    /// comparable with that of runs before they were told.
+    pub fn show_episodes(&mut self, episodes: &Episodes) {
+        self.episodes = EpisodeSummary::of(episodes);
     }
 
     /// A distribution of the network by the name of its quantity.
