@@ -13,10 +13,10 @@ use isodp::study::gsd::Gsd;
 use isodp::study::plan::command::{Call, answer};
 use isodp::study::plan::rules::warnings;
 use isodp::study::replay::{Window, replay};
-use isodp::study::run::{Outcome, Progress, run};
+use isodp::study::run::{Outcome, Progress, layout, run};
 use isodp::study::scenario::{Extent, Scenario, disturbance};
 use isodp::study::what_if::command as what_if;
-use isodp::study::{devices, report};
+use isodp::study::{devices, figure, report};
 use isodp::time::Span;
 
 /// A planned network breaks a rule, or a GSD file is inconsistent.
@@ -71,6 +71,8 @@ enum Command {
     Devices(DevicesArgs),
     /// Lists the disturbances that a scenario can name, with their keys and an example of each.
     Disturbances,
+    /// Lists the figures that a run can be asked for by name: all families, or the names of one scenario.
+    Figures(FiguresArgs),
     /// Shows what a GSD file says, what of it is ignored and what does not fit.
     #[command(after_help = GSD_CODES)]
     Gsd(GsdArgs),
@@ -81,6 +83,13 @@ struct DevicesArgs {
     /// The device to tell about.
     #[arg(value_name = "NAME")]
     name: Option<String>,
+}
+
+#[derive(Args)]
+struct FiguresArgs {
+    /// Scenario file (TOML) whose names are listed.
+    #[arg(value_name = "FILE")]
+    scenario: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -169,6 +178,7 @@ fn main() -> ExitCode {
         Command::Replay(args) => replay_command(args).map(done),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
         Command::Disturbances => Ok(done(disturbance::list())),
+        Command::Figures(args) => figures_command(args.scenario.as_deref()).map(done),
         Command::Gsd(args) => gsd_command(&args.file),
     };
     match result.and_then(|(page, code)| show(&page).map(|()| code)) {
@@ -218,6 +228,13 @@ fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error
 
 fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
     Ok(name.map_or_else(|| Ok(devices::list()), devices::full)?)
+}
+
+fn figures_command(file: Option<&Path>) -> Result<String, Box<dyn std::error::Error>> {
+    Ok(match file {
+        Some(file) => figure::page::of(&layout(&Scenario::load(file, &[])?)),
+        None => figure::page::list(),
+    })
 }
 
 fn replay_command(args: ReplayArgs) -> Result<String, Box<dyn std::error::Error>> {

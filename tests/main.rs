@@ -9,6 +9,7 @@ mod dxb;
 mod encoder;
 mod encoder_scenarios;
 mod episodes;
+mod figures;
 mod foreign;
 mod golden;
 mod gsd;

@@ -141,7 +141,9 @@ impl Spread {
         self.total += i128::from(time.ticks());
         self.count += 1;
     }
-    fn merged(self, other: Self) -> Self {
+    /// Both together.
+    #[must_use]
+    pub fn merged(self, other: Self) -> Self {
         match (self.count, other.count) {
             (0, _) => other,
             (_, 0) => self,

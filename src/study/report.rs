@@ -6,6 +6,7 @@ use super::masters;
 use super::summary::{
     Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, StationSummary, Summary, Timing,
 };
+use super::verdict;
 use crate::observation::Leds;
 use crate::time::Span;
 
@@ -31,6 +32,7 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     acyclic(summary, &mut lines);
     fingerprint(summary, &mut lines);
     files(summary, dir, &mut lines);
+    verdicts(summary, &mut lines);
     lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
@@ -331,6 +333,14 @@ fn files(summary: &Summary, dir: Option<&str>, lines: &mut Vec<String>) {
     }
     if let Some(dir) = dir {
         lines.push(format!("{} in {dir}", number(summary.files.len(), "file")));
+    }
+}
+
+/// What became of the scenario's expectations, last, since it is what one looks for.
+fn verdicts(summary: &Summary, lines: &mut Vec<String>) {
+    if !summary.verdicts.is_empty() {
+        lines.push(String::new());
+        lines.extend(verdict::page::lines(&summary.verdicts));
     }
 }
 

@@ -8,6 +8,7 @@ use super::count::Counts;
 use super::episode::Episodes;
 use super::event_budget::{EventBudget, NoHeadway};
 use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
+use super::figure::Figures;
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, MasterLayout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
@@ -17,6 +18,7 @@ use super::row::Sink;
 use super::scenario::{Extent, Scenario};
 use super::summary::{Facts, SlaveFacts, Summary};
 use super::topology::Map;
+use super::verdict;
 use crate::device::node::Node;
 use crate::observation::MasterClass;
 use crate::sim::fingerprint::{Digest, Fingerprint, Fingerprints};
@@ -51,6 +53,8 @@ pub struct Outcome {
     pub stations: Vec<(Address, Fingerprint)>,
     /// Hash of every figure of the summary.
     pub statistics: u64,
+    /// Everything that was counted and recorded, by name.
+    pub figures: Figures,
     /// Where the files are, if there are any.
     pub dir: Option<PathBuf>,
 }
@@ -164,15 +168,15 @@ pub fn run<Q: Queue<NetworkEvent>>(
     sinks.episodes.finish(network.now());
 
     let summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
-    conclude(scenario, summary, &counts, sinks, (&fingerprints, bus.as_ref()), dir)
+    conclude(scenario, summary, counts, sinks, (&fingerprints, bus.as_ref()), dir)
 }
 
 /// Adds the fingerprints, the LEDs, what slaves and masters did and the topology, then writes the files.
 fn conclude(
     scenario: &Scenario,
     mut summary: Summary,
-    counts: &Counts,
-    sinks: Sinks,
+    counts: Counts,
+    Sinks { histograms, episodes, exports, plots }: Sinks,
     (fingerprints, bus): (&Fingerprints, Option<&BusCycle>),
     dir: Option<PathBuf>,
 ) -> Result<Outcome, RunError> {
@@ -187,10 +191,12 @@ fn conclude(
         ("statistics", statistics),
     ];
     summary.fingerprint = texts.map(|(name, hash)| (name.to_owned(), format!("{hash:016x}"))).to_vec();
-    summary.show_leds(counts);
-    summary.show_receptions(counts);
-    summary.show_acyclic(counts);
-    summary.show_episodes(&sinks.episodes);
+    summary.show_leds(&counts);
+    summary.show_receptions(&counts);
+    summary.show_acyclic(&counts);
+    summary.show_episodes(&episodes);
+    let figures = Figures::new(counts, histograms, episodes);
+    summary.verdicts = verdict::judge(&scenario.expectations, &figures);
     let map = Map::of(scenario);
     if scenario.topology.has_segments() {
         summary.topology = map.text(false);
@@ -198,18 +204,18 @@ fn conclude(
     summary.warnings = rules::warnings(scenario);
 
     let mut pictures = Vec::new();
-    if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {
-        pictures = stage(dir, plots.pictures(&distributions(&sinks.histograms), bus)?)?;
+    if let (Some(dir), Some(plots), Some(bus)) = (&dir, &plots, bus) {
+        pictures = stage(dir, plots.pictures(&distributions(figures.histograms()), bus)?)?;
         summary.files.extend(plots.files().map(str::to_owned));
     }
     if let Some(dir) = &dir {
         pictures.extend(stage(dir, vec![(TOPOLOGY, map.text(true).join("\n") + "\n")])?);
         summary.files.push(TOPOLOGY.to_owned());
     }
-    if let Some(exports) = sinks.exports {
-        exports.finish(pictures, &sinks.histograms, &mut summary)?;
+    if let Some(exports) = exports {
+        exports.finish(pictures, figures.histograms(), &mut summary)?;
     }
-    Ok(Outcome { summary, fingerprint, stations: fingerprints.stations().collect(), statistics, dir })
+    Ok(Outcome { summary, fingerprint, stations: fingerprints.stations().collect(), statistics, figures, dir })
 }
 
 /// Writes pictures and texts under temporary names.

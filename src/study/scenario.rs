@@ -11,6 +11,7 @@ mod class1;
 mod class2;
 pub mod disturbance;
 pub mod error;
+mod expect;
 #[cfg(test)]
 mod faults;
 mod gsd;
@@ -40,6 +41,7 @@ pub use crate::sim::fault::window::{Bursts, Window};
 pub use crate::sim::fault::{Disturbance, What};
 use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
+use crate::study::verdict::Expectation;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
 use crate::wire::control::GlobalControl;
@@ -83,6 +85,8 @@ pub struct Scenario {
     pub disturbances: Vec<Disturbance>,
     /// What to keep.
     pub record: Record,
+    /// What is expected of the run's figures, in the order of the file.
+    pub expectations: Vec<Expectation>,
 }
 
 /// Where the text of a scenario comes from.
@@ -688,6 +692,7 @@ pub(crate) mod tests {
                 tables: CsvTable::ALL.iter().map(|&(_, table)| table).collect(),
                 rows: 20_000,
             },
+            expectations: Vec::new(),
         }
     }
 

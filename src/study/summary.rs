@@ -10,6 +10,7 @@ use super::export::thinning::Thinning;
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
 use super::live_list::{Seen, Station};
 use super::masters::MasterSummary;
+use super::verdict::Verdict;
 use crate::observation::Leds;
 use crate::time::{BitRate, Span};
 use crate::wire::Address;
@@ -54,6 +55,9 @@ pub struct Summary {
     /// Name and text of each fingerprint.
     #[serde(serialize_with = "map")]
     pub fingerprint: Vec<(String, String)>,
+    /// What became of the scenario's expectations, in their order; nothing where it expects nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub verdicts: Vec<Verdict>,
     /// What each table of rows kept.
     pub thinning: Vec<Thinning>,
     /// Events that `events.csv` does not hold.
@@ -455,6 +459,7 @@ impl Summary {
             fingerprint: facts.fingerprint,
             topology: Vec::new(),
             warnings: Vec::new(),
+            verdicts: Vec::new(),
             thinning: Vec::new(),
             events_left_out: 0,
             files: Vec::new(),
@@ -482,6 +487,10 @@ impl Summary {
         self.acyclic = AcyclicSummary::all(&counts.acyclic);
     }
 
+    /// Whether every expectation of the scenario holds.
+    pub fn passed(&self) -> bool {
+        self.verdicts.iter().all(|verdict| verdict.passed)
+    }
     /// Adds the episodes. What they are made of is in the fingerprint of the states; the hash of all figures stays
     /// comparable with that of runs before they were told.
     pub fn show_episodes(&mut self, episodes: &Episodes) {
