@@ -15,6 +15,7 @@ use isodp::study::plan::rules::warnings;
 use isodp::study::replay::{Window, replay};
 use isodp::study::run::{Outcome, Progress, layout, run};
 use isodp::study::scenario::{Extent, Scenario, disturbance};
+use isodp::study::what_if::command as what_if;
 use isodp::study::{devices, figure, report};
 use isodp::time::Span;
 
@@ -33,6 +34,8 @@ Examples:
       What its bus cycle will be and whether its times keep the rules; --propose shows times that do.
   isodp replay scenarios/reference.toml --cycle 200 --window 2
       Cycles 198 to 202 of the run once more, every telegram and what stations saw, line by line.
+  isodp replay scenarios/reference.toml --cycle 200 --set slave.5.crystal='60 ppm'
+      What if: from cycle 200 on a second future with this crystal runs beside the original; what differs, and when first.
   isodp devices posital-ocd-dpb1b
       What the profile of this device says; without a name, all devices.
   isodp gsd scenarios/gsd/isodp_posital_06df.gsd
@@ -126,15 +129,19 @@ struct ReplayArgs {
     /// The cycle in the middle.
     #[arg(long, value_name = "C")]
     cycle: u64,
-    /// How many cycles before and after it are told too.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    window: u64,
+    /// How many cycles before and after it are told too; with --set, how many cycles both futures go on.
+    #[arg(long, value_name = "N")]
+    window: Option<u64>,
     /// Seed of all random streams, instead of the scenario's.
     #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
     seed: Option<u64>,
-    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    /// What if: from the cycle on another future runs beside the original, with this value of the scenario, for example
+    /// slave.3.crystal='40 ppm'. May be given several times.
+    #[arg(long = "set", visible_alias = "what-if", value_name = "KEY=VALUE", value_parser = assignment)]
     sets: Vec<(String, String)>,
+    /// Changes a value for the whole run, as --set of isodp run does. May be given several times.
+    #[arg(long = "run-set", value_name = "KEY=VALUE", value_parser = assignment)]
+    run_sets: Vec<(String, String)>,
 }
 
 #[derive(Args)]
@@ -231,8 +238,13 @@ fn figures_command(file: Option<&Path>) -> Result<String, Box<dyn std::error::Er
 }
 
 fn replay_command(args: ReplayArgs) -> Result<String, Box<dyn std::error::Error>> {
-    let scenario = Scenario::load(&args.scenario, &with_seed(args.sets, args.seed))?;
-    Ok(replay::<NearQueue<NetworkEvent>>(&scenario, Window::around(args.cycle, args.window))?)
+    let ReplayArgs { scenario: file, cycle, window, seed, sets, run_sets } = args;
+    let run_sets = with_seed(run_sets, seed);
+    if !sets.is_empty() {
+        return what_if::answer(&what_if::Call { file, run_sets, sets, cycle, window });
+    }
+    let scenario = Scenario::load(&file, &run_sets)?;
+    Ok(replay::<NearQueue<NetworkEvent>>(&scenario, Window::around(cycle, window.unwrap_or(0)))?)
 }
 
 /// Overrides with that of the seed, where one is given.

@@ -30,3 +30,4 @@ mod statistics;
 mod support;
 mod swarm;
 mod topology;
+mod what_if;
