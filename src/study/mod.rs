@@ -7,6 +7,7 @@ pub mod build;
 pub mod count;
 pub mod devices;
 pub mod episode;
+pub mod event_budget;
 pub mod export;
 pub mod gsd;
 pub mod histogram;
@@ -24,5 +25,6 @@ pub mod run;
 #[cfg(test)]
 mod sample;
 pub mod scenario;
+pub mod statistics;
 pub mod summary;
 pub mod topology;

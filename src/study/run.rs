@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::build;
 use super::count::Counts;
 use super::episode::Episodes;
+use super::event_budget::{EventBudget, NoHeadway};
 use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, MasterLayout, SlaveLayout};
@@ -25,8 +26,6 @@ use crate::sim::queue::Queue;
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
-/// Events between two looks at the progress.
-const STRIDE: u64 = 50_000;
 /// File of the topology in text.
 const TOPOLOGY: &str = "topology.txt";
 /// Bins of a histogram in a picture.
@@ -62,6 +61,9 @@ pub enum RunError {
     /// A table, log or summary could not be written.
     #[error(transparent)]
     Export(#[from] ExportError),
+    /// It makes no headway.
+    #[error(transparent)]
+    NoHeadway(#[from] NoHeadway),
     /// A picture could not be written.
     #[error(transparent)]
     Plot(#[from] PlotError),
@@ -138,7 +140,7 @@ pub const fn until(scenario: &Scenario) -> Until {
 pub fn run<Q: Queue<NetworkEvent>>(
     scenario: &Scenario,
     out: Option<&Path>,
-    mut watch: impl FnMut(Progress),
+    watch: impl FnMut(Progress),
 ) -> Result<Outcome, RunError> {
     let dir = out.filter(|_| scenario.record.files).map(|out| out.join(&scenario.name));
     let layout = layout(scenario);
@@ -156,11 +158,7 @@ pub fn run<Q: Queue<NetworkEvent>>(
 
     let mut network: Network<Node, Q> = build::network(scenario);
     let mut recorder = (Fingerprints::new(scenario.master.address), (metrics, bus));
-    let end = until(scenario);
-    while !network.run(end, STRIDE, &mut recorder) {
-        watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
-    }
-    watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
+    EventBudget::of(scenario).run(&mut network, scenario, &mut recorder, watch)?;
     let (fingerprints, (metrics, bus)) = recorder;
     let (counts, mut sinks) = metrics.finish(network.now());
     sinks.episodes.finish(network.now());

@@ -284,6 +284,8 @@ pub struct Run {
     pub seed: u64,
     /// Where the run ends.
     pub duration: Extent,
+    /// Events per T_DP beyond which a run makes no headway, at least 1; none is what the bits of a T_DP allow.
+    pub max_events: Option<u64>,
 }
 
 impl Run {
@@ -649,7 +651,7 @@ pub(crate) mod tests {
         Scenario {
             name: "network".into(),
             question: String::new(),
-            run: Run { seed: 1, duration: Extent::Cycles(1_000) },
+            run: Run { seed: 1, duration: Extent::Cycles(1_000), max_events: None },
             bus: Bus { params: BusParams::profile(rate), cable_mm: 0 },
             topology: Topology::line(0),
             master: Master {

@@ -331,9 +331,10 @@ fn run(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Run> {
         let fault = Fault::new("a run has either duration or cycles");
         section.complain(reader, fault.help("for example: duration = \"20 s\", or cycles = 10000"));
     }
+    let max_events = section.optional(reader, "max_events", number(1..=u64::MAX));
     section.finish(reader);
     let duration = time.map(Extent::Time).or(cycles.map(Extent::Cycles))?;
-    Some(Run { seed, duration })
+    Some(Run { seed, duration, max_events })
 }
 
 /// Reads `[bus]`.
