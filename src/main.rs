@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isodp::sim::network::NetworkEvent;
 use isodp::sim::queue::NearQueue;
+use isodp::study::budget::Budget;
 use isodp::study::gsd::Gsd;
 use isodp::study::plan::command::{Call, answer};
 use isodp::study::plan::rules::warnings;
@@ -40,6 +41,8 @@ Examples:
       What the profile of this device says; without a name, all devices.
   isodp gsd scenarios/gsd/isodp_posital_06df.gsd
       What a GSD file says; scenarios use it with device = { gsd = FILE }.
+  isodp budget scenarios/gc-jitter.toml
+      What uses up the clock window T_PLL_W of each encoder: jitter, crystals, timer grid, loop.
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
 
@@ -64,6 +67,9 @@ enum Command {
     /// Reckons what a scenario's bus cycle will be, and which rules its times keep, without simulating it.
     #[command(after_help = EXAMPLES)]
     Plan(PlanArgs),
+    /// Shares out the clock window T_PLL_W of each encoder among jitter, crystals and timer grid, by switching them off.
+    #[command(after_help = EXAMPLES)]
+    Budget(RunArgs),
     /// Runs a scenario again and tells a stretch of it, every telegram and every observation, line by line.
     #[command(after_help = EXAMPLES)]
     Replay(ReplayArgs),
@@ -175,6 +181,7 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(args) => run_command(args).map(done),
         Command::Plan(args) => plan_command(args),
+        Command::Budget(args) => budget_command(args).map(done),
         Command::Replay(args) => replay_command(args).map(done),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
         Command::Disturbances => Ok(done(disturbance::list())),
@@ -224,6 +231,26 @@ fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error
     let answer = answer(&Call { file, sets, propose, rules, slave, out })?;
     let code = if answer.violated { ExitCode::from(VIOLATED) } else { ExitCode::SUCCESS };
     Ok((answer.page, code))
+}
+
+fn budget_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
+    let scenario = Scenario::load(&args.scenario, &with_seed(args.sets, args.seed))?;
+    for warning in warnings(&scenario) {
+        let _ = writeln!(anstream::stderr(), "warning: {warning}");
+    }
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    bar.set_prefix(scenario.name.clone());
+    bar.set_style(
+        ProgressStyle::with_template("{prefix} [{bar:30}] {pos} of {len} runs").expect("a template that is right"),
+    );
+    let budget = Budget::of(&scenario, |runs| {
+        bar.set_length(runs as u64);
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    let dir = args.out.join(&scenario.name);
+    let files = budget.write(&scenario, &dir)?;
+    Ok(format!("{}{} in {}\n", budget.page(), files.join(", "), dir.display()))
 }
 
 fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
