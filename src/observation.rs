@@ -720,6 +720,8 @@ pub enum Observation {
     },
     /// The scenario disturbed a telegram of this station.
     Disturbed {
+        /// Number of the disturbance in the scenario, from 0.
+        number: u16,
         /// How.
         how: Disturbance,
     },
@@ -884,7 +886,7 @@ impl fmt::Display for Observation {
             Self::Used { publisher, position } => write!(f, "position {position} of publisher {publisher} used"),
             Self::Link { publisher, from, to } => write!(f, "link to {publisher}: {from} -> {to}"),
             Self::Collision { with } => write!(f, "collision with {with}"),
-            Self::Disturbed { how } => write!(f, "disturbed: {how}"),
+            Self::Disturbed { how, .. } => write!(f, "disturbed: {how}"),
         }
     }
 }

@@ -405,7 +405,7 @@ fn class_2_masters_beside() {
 /// takes its repeats, and less is left.
 fn busy(rate: &str, slaves: u8, slack: u32, reads: u32, lossy: u8) -> Scenario {
     let lost =
-        |slave| format!("[[disturbance]]\nkind = \"lost-telegrams\"\nfrom = {slave}\nfrom_cycle = 70\nevery = 2\n");
+        |slave| format!("[[disturbance]]\nkind = \"lost-telegrams\"\nfrom = {slave}\ncycle = 70\nfor = 1\nevery = 2\n");
     let lost: String = (3..3 + lossy.min(slaves)).map(lost).collect();
     let events: String = (0..reads).map(|i| read(u64::from(60 + i), "slaves = \"all\"")).collect();
     let text = |steps: u32| {

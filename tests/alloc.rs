@@ -67,9 +67,9 @@ fn a_fault_and_its_acknowledgement_allocate_nothing() {
     let scenario = reference(&[]);
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/reference.toml"));
     let text = text.expect("a scenario")
-        + "\n[[disturbance]]\nkind = \"missing-clocks\"\nfrom_cycle = 500\ncount = 3\nevery = 200\n\
+        + "\n[[disturbance]]\nkind = \"missing-clocks\"\ncycle = 500\nfor = 3\nevery = 200\n\
            [[event]]\ncycle = 1200\ndo = \"acknowledge\"\nslaves = \"all\"\n\
-           [[disturbance]]\nkind = \"lost-telegrams\"\nfrom = 4\nfrom_cycle = 300\nevery = 50\n";
+           [[disturbance]]\nkind = \"lost-telegrams\"\nfrom = 4\ncycle = 300\nfor = 1\nevery = 50\n";
     let disturbed = Scenario::parse(&scenario.name, "disturbed", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
 }

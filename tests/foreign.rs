@@ -42,8 +42,8 @@ impl Left {
     /// A run in which clocks and telegrams are lost, so that no table and no count is empty.
     fn new() -> Self {
         let room = Room::new();
-        let disturbed = "[[disturbance]]\nkind = \"missing-clocks\"\nfrom_cycle = 150\ncount = 2\n\
-                         [[disturbance]]\nkind = \"lost-telegrams\"\nto = 4\nfrom_cycle = 160\ncount = 3\n";
+        let disturbed = "[[disturbance]]\nkind = \"missing-clocks\"\ncycle = 150\nfor = 2\n\
+                         [[disturbance]]\nkind = \"lost-telegrams\"\nto = 4\ncycle = 160\nfor = 3\n";
         room.write("scene.toml", SCENE.replace("\"150 ms\"", "\"600 ms\"") + disturbed);
         room.runs(&["run", "scene.toml"]);
         let text = fs::read_to_string(room.path("out/scene/summary.json")).expect("a summary");

@@ -37,13 +37,14 @@ silent = true
 kind = "lost-telegrams"
 from = 3
 service = "data-exchange"
-from_cycle = 150
+cycle = 150
+for = 1
 [[disturbance]]
 kind = "lost-telegrams"
 from = 3
 service = "data-exchange"
-from_cycle = 250
-count = 12
+cycle = 250
+for = 12
 [[event]]
 cycle = 200
 do = "power-off"
@@ -378,8 +379,8 @@ period = "10 ms"
 kind = "lost-telegrams"
 from = 6
 service = "any"
-from_cycle = 150
-count = 6
+cycle = 150
+for = 6
 [[event]]
 cycle = 550
 do = "power-off"

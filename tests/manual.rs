@@ -128,7 +128,7 @@ fn v11_et_200m_jitter_and_start_up() {
 fn v12_failure_counter_of_the_sign_of_life() {
     for tolerance in 1..=10 {
         let lost = |slave, count| {
-            format!("[[disturbance]]\nkind = \"lost-telegrams\"\nto = {slave}\nfrom_cycle = 200\ncount = {count}\n")
+            format!("[[disturbance]]\nkind = \"lost-telegrams\"\nto = {slave}\ncycle = 200\nfor = {count}\n")
         };
         let own = format!("max_life_failures = {tolerance}");
         let entries = [encoder(3, &own), encoder(4, &own), lost(3, tolerance), lost(4, tolerance + 1)].concat();
@@ -146,8 +146,7 @@ fn v12_failure_counter_of_the_sign_of_life() {
 fn v12_failure_counter_of_the_clock() {
     for tolerance in 1..=10 {
         let own = |tolerance| format!("clock_tolerance = {tolerance}");
-        let missing =
-            format!("[[disturbance]]\nkind = \"missing-clocks\"\nfrom_cycle = 200\ncount = {}\n", tolerance + 1);
+        let missing = format!("[[disturbance]]\nkind = \"missing-clocks\"\ncycle = 200\nfor = {}\n", tolerance + 1);
         let entries = [encoder(3, &own(tolerance + 1)), encoder(4, &own(tolerance)), missing].concat();
         let run = Run::of(&parse(&tables(BitRate::M12, 300, ""), &entries).expect("a good scenario"));
         let peak = |slave| run.slave(slave).map(|row| row.clock_counter).max();
@@ -161,8 +160,8 @@ fn v12_failure_counter_of_the_clock() {
 #[test]
 fn v12_ten_good_values_repay_a_failure() {
     for (good, trips) in [(9, true), (10, false)] {
-        let lost = |cycle| format!("[[disturbance]]\nkind = \"lost-telegrams\"\nto = 3\nfrom_cycle = {cycle}\n");
-        let missing = |cycle| format!("[[disturbance]]\nkind = \"missing-clocks\"\nfrom_cycle = {cycle}\n");
+        let lost = |cycle| format!("[[disturbance]]\nkind = \"lost-telegrams\"\nto = 3\ncycle = {cycle}\nfor = 1\n");
+        let missing = |cycle| format!("[[disturbance]]\nkind = \"missing-clocks\"\ncycle = {cycle}\nfor = 1\n");
         let entries = [encoder(3, ""), lost(200), lost(200 + good + 1), missing(250), missing(250 + good + 1)].concat();
         let run = Run::of(&parse(&tables(BitRate::M12, 350, ""), &entries).expect("a good scenario"));
         let first = (200 + good + 1, 0x0F02);
@@ -176,7 +175,7 @@ fn v12_ten_good_values_repay_a_failure() {
 #[test]
 fn v12_failure_counter_of_the_master() {
     for (count, trips) in [(4, false), (5, true)] {
-        let lost = format!("[[disturbance]]\nkind = \"lost-telegrams\"\nfrom = 3\nfrom_cycle = 200\ncount = {count}\n");
+        let lost = format!("[[disturbance]]\nkind = \"lost-telegrams\"\nfrom = 3\ncycle = 200\nfor = {count}\n");
         let run = Run::of(&parse(&tables(BitRate::M12, 300, ""), &[encoder(3, ""), lost].concat()).expect("good"));
         let tripped = |what: &Observation| matches!(what, Observation::SlaveLife { tripped: true, .. });
         let cycles: Vec<_> = run.events_of(2).filter(|row| tripped(&row.what)).map(|row| row.cycle).collect();

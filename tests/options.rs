@@ -243,7 +243,7 @@ fn a_coarse_timer_latches_at_coarse_instants() {
 #[test]
 fn failures_in_a_row_start_over_when_the_option_says_so() {
     let first = with("").slave(3).find(|row| row.pll == PllState::Narrowing).expect("a start").cycle;
-    let gap = format!("[[disturbance]]\nkind = \"missing-clocks\"\nfrom_cycle = {}\ncount = 2\n", first + 3);
+    let gap = format!("[[disturbance]]\nkind = \"missing-clocks\"\ncycle = {}\nfor = 2\n", first + 3);
     let waits = |slave: &str| {
         let run = run("", slave, &gap);
         run.observations.iter().filter(|seen| matches!(seen.2, Observation::Pll { to: PllState::Waiting, .. })).count()

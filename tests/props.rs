@@ -262,7 +262,7 @@ struct Bursts {
 }
 impl std::fmt::Display for Bursts {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        writeln!(f, "count = {}", self.count)?;
+        writeln!(f, "for = {}", self.count)?;
         self.every.map_or(Ok(()), |every| writeln!(f, "every = {every}"))
     }
 }
@@ -349,7 +349,7 @@ fn tables(blows: &[Blow], addresses: &[u8]) -> String {
                 write!(text, "[[event]]\nat = \"{at_ms} ms\"\n{}\n", order(action, *slave))
             }
             Blow::MissingClocks { from, bursts } => {
-                write!(text, "[[disturbance]]\nkind = \"missing-clocks\"\nfrom_cycle = {from}\n{bursts}")
+                write!(text, "[[disturbance]]\nkind = \"missing-clocks\"\ncycle = {from}\n{bursts}")
             }
             Blow::Lost { from, to, master, data, cycle, bursts } => {
                 let from = if *master { Some(2) } else { from.map(address) };
@@ -358,7 +358,7 @@ fn tables(blows: &[Blow], addresses: &[u8]) -> String {
                 let service = if *data { "data-exchange" } else { "any" };
                 write!(
                     text,
-                    "[[disturbance]]\nkind = \"lost-telegrams\"\n{from}{to}service = \"{service}\"\nfrom_cycle = {cycle}\n{bursts}"
+                    "[[disturbance]]\nkind = \"lost-telegrams\"\n{from}{to}service = \"{service}\"\ncycle = {cycle}\n{bursts}"
                 )
             }
         };

@@ -168,6 +168,7 @@ impl Recorder for Fingerprints {
 mod tests {
     use super::*;
     use crate::sim::crystal::Crystal;
+    use crate::sim::record::Origin;
     use crate::time::{Local, Span};
 
     const MASTER: Address = Address::new(2).unwrap();
@@ -175,7 +176,7 @@ mod tests {
     fn send(all: &mut Fingerprints, sender: u8, octets: &[u8]) {
         let start = Time::ZERO + Span::from_us(1);
         let sender = Address::new(sender).unwrap();
-        all.telegram(&Transmission { start, end: start, sender, octets });
+        all.telegram(&Transmission { start, end: start, sender, octets, origin: Origin::Sender });
     }
 
     #[test]

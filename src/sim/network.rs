@@ -8,14 +8,16 @@ use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
 use crate::observation::{self, Observation};
 use crate::sim::bus::{Bus, FlightId};
 use crate::sim::crystal::Crystal;
-use crate::sim::fault::Disturbance;
+use crate::sim::fault::Faults;
 use crate::sim::motion::{Resolution, Shaft};
 use crate::sim::noise::{JitterSource, LinkJitter};
 use crate::sim::queue::{Key, NearQueue, Phase, Queue};
-use crate::sim::record::{Recorder, Stamp, Transmission};
+use crate::sim::record::{Origin, Recorder, Stamp, Transmission};
 use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::Address;
+
+mod alter;
 
 /// One station and the world around it.
 #[derive(Clone, Debug)]
@@ -101,6 +103,7 @@ enum Event {
     Deadline(u8),
 }
 
+#[derive(Clone)]
 struct Slot<S> {
     site: Site<S>,
     address: Address,
@@ -114,7 +117,8 @@ struct Slot<S> {
     number: u64,
 }
 
-/// A network in time. `Q` is the event queue; any queue gives the same run.
+/// A network in time. `Q` is the event queue; any queue gives the same run. A clone goes on as the original does.
+#[derive(Clone)]
 pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     rate: BitRate,
     slots: Vec<Slot<S>>,
@@ -127,8 +131,10 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     bus: Bus,
     queue: Q,
     jitter: JitterSource,
-    disturbances: Vec<Disturbance>,
+    faults: Faults,
     acts: Vec<(usize, Act<S::Command>)>,
+    /// Which of them do not count any more.
+    cancelled: core::ops::Range<usize>,
     /// Acts bound to cycles, by cycle.
     cycle_acts: Vec<(u64, usize)>,
     next_cycle_act: usize,
@@ -151,12 +157,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     ///
     /// # Panics
     /// If two stations have one address, or there are more than 127: the caller checks scenarios.
-    pub fn new(
-        rate: BitRate,
-        (wiring, sites): (Wiring, Vec<Site<S>>),
-        jitter: JitterSource,
-        disturbances: Vec<Disturbance>,
-    ) -> Self {
+    pub fn new(rate: BitRate, (wiring, sites): (Wiring, Vec<Site<S>>), jitter: JitterSource, faults: Faults) -> Self {
         let places: Vec<_> = sites.iter().map(|site| site.place).collect();
         let mut by_address = [None; 128];
         let mut slots = Vec::with_capacity(sites.len());
@@ -186,8 +187,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             bus: wiring.bus(&places),
             queue: Q::default(),
             jitter,
-            disturbances,
+            faults,
             acts: Vec::new(),
+            cancelled: 0..0,
             cycle_acts: Vec::new(),
             next_cycle_act: 0,
             now: Time::ZERO,
@@ -254,6 +256,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.now = key.time();
         let slot = usize::from(self.by_address[usize::from(key.station())].expect("events belong to stations"));
         match event {
+            Event::Act(act) if self.cancelled.contains(&(act as usize)) => {}
             Event::Act(act) => self.act(act as usize, recorder),
             Event::Telegram(id) => self.telegram(slot, id, recorder),
             Event::Broadcast(id, rank) => {
@@ -425,20 +428,19 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             start += jitter;
             end += jitter;
         }
-        let lost = self
-            .disturbances
-            .iter()
-            .any(|what| what.loses(self.clocks_begun(send.clock), address, send.clock, frame.octets()));
+        let running = (start, self.clocks_begun(send.clock));
+        let lost = self.faults.loses(running, address, send.clock, frame.octets());
         if send.clock {
             // The master's transmitter runs, whatever becomes of the telegram.
             self.begin_cycle(slot, end);
         }
-        if lost {
+        if let Some(number) = lost {
             let how = observation::Disturbance::Lost;
-            return self.tell(slot, &Observation::Disturbed { how }, recorder);
+            return self.tell(slot, &Observation::Disturbed { number, how }, recorder);
         }
         let Some((_, frame)) = self.out.sending() else { return };
-        recorder.telegram(&Transmission { start, end, sender: address, octets: frame.octets() });
+        let (octets, origin) = (frame.octets(), Origin::Sender);
+        recorder.telegram(&Transmission { start, end, sender: address, octets, origin });
         let (id, hit) = self.bus.send(slot, (start, end), frame);
         if let Some(with) = hit {
             self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);

@@ -92,12 +92,21 @@ impl Stream {
     pub fn of_link(seed: u64, link: &str, purpose: Purpose) -> Self {
         /// No station's address.
         const NO_STATION: u8 = 127;
-        let hash = link
+        Self::named(seed, NO_STATION, link, purpose)
+    }
+    /// The stream of (`seed`, the disturbance called `name`, `station`, `purpose`), at its beginning: each station that
+    /// a disturbance means has draws of its own.
+    pub fn of_disturbance(seed: u64, name: &str, station: u8, purpose: Purpose) -> Self {
+        Self::named(seed, station, name, purpose)
+    }
+    /// A stream with 56 bits of a name's FNV-1a hash beside the station.
+    fn named(seed: u64, station: u8, name: &str, purpose: Purpose) -> Self {
+        let hash = name
             .bytes()
             .fold(0xcbf2_9ce4_8422_2325, |hash: u64, octet| (hash ^ u64::from(octet)).wrapping_mul(0x0100_0000_01b3));
         let mut key = [0; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
-        key[8] = NO_STATION;
+        key[8] = station;
         key[9..16].copy_from_slice(&hash.to_le_bytes()[..7]);
         key[16..24].copy_from_slice(&purpose.key());
         key[24..].copy_from_slice(&KEY_DOMAIN);
@@ -324,6 +333,16 @@ impl JitterSource {
         Ok(Self { jitter, stream: Stream::new(seed, station, Purpose::GcJitter) })
     }
 
+    /// Strays as `jitter` says from the next clock on. The stream goes on where it is.
+    ///
+    /// # Errors
+    /// Those of [`GcJitter::check`]; nothing is changed then.
+    pub fn change(&mut self, jitter: GcJitter) -> Result<(), JitterError> {
+        jitter.check()?;
+        self.jitter = jitter;
+        Ok(())
+    }
+
     /// How much later than nominal the next clock leaves. Signed.
     pub fn draw(&mut self) -> Span {
         match self.jitter {
@@ -456,6 +475,11 @@ mod tests {
             seen.push(of(name));
         }
         assert_ne!(draws(Stream::of_link(SEED + 1, "a", Purpose::Repeater)), of("a"));
+        for station in [0, 3, 125] {
+            let these = draws(Stream::of_disturbance(SEED, "a", station, Purpose::Repeater));
+            assert!(seen.iter().flatten().all(|word| !these.contains(word)), "{station}");
+            seen.push(these);
+        }
         let mut jitter = LinkJitter::new(US, SEED, "a");
         let strays: Vec<i64> = (0..10_000).map(|_| jitter.draw().ticks()).collect();
         assert!(strays.iter().all(|t| t.abs() <= US.ticks()) && strays.iter().any(|t| t.abs() > US.ticks() * 99 / 100));

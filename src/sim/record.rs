@@ -16,6 +16,18 @@ pub struct Transmission<'a> {
     pub sender: Address,
     /// The characters.
     pub octets: &'a [u8],
+    /// How it came onto the line.
+    pub origin: Origin,
+}
+
+/// How a telegram came onto the line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Origin {
+    /// Its sender sent it.
+    #[default]
+    Sender,
+    /// A disturbance of this number, from 0, put it there at the sender's place.
+    Disturbance(u16),
 }
 
 /// Who saw something, and when.

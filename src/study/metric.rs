@@ -30,7 +30,7 @@ impl<F: Fn(Address, Time) -> f64> Shafts for F {
 }
 
 /// Makes rows of a run and hands them to a sink.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Metrics<S, V> {
     layout: Layout,
     shafts: V,
@@ -52,14 +52,14 @@ pub struct Metrics<S, V> {
 const HELD: usize = 512;
 
 /// The nominal latch instant of all slaves with one T_I.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Grid {
     t_i: Span,
     latch: Time,
 }
 
 /// What is known of one slave.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Watch {
     /// The row of this cycle; what it does not renew is carried over to the next.
     row: SlaveRow,
@@ -77,7 +77,7 @@ struct Watch {
 }
 
 /// What is known of one link in this cycle.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct LinkWatch {
     publisher: usize,
     row: LinkRow,
@@ -382,6 +382,7 @@ impl Watch {
 mod tests {
     use super::*;
     use crate::observation::{Inputs, SlaveCause};
+    use crate::sim::record::Origin;
     use crate::study::sample::{self, address};
 
     /// Keeps every row.
@@ -442,8 +443,13 @@ mod tests {
         }
         fn reply(&mut self, ns: i64, station: u8, destination: u8) {
             let octets = [0x68, 4, 4, 0x68, destination, station, 0x08, 0, 0, 0x16];
-            let telegram =
-                Transmission { start: at(ns), end: at(ns + 9_000), sender: address(station), octets: &octets };
+            let telegram = Transmission {
+                start: at(ns),
+                end: at(ns + 9_000),
+                sender: address(station),
+                octets: &octets,
+                origin: Origin::Sender,
+            };
             self.metrics.telegram(&telegram);
         }
         fn over(self, ns: i64) -> (Counts, Kept) {

@@ -100,7 +100,7 @@ fn commands_in_clear_say_clear_too() {
 
 #[test]
 fn a_slave_without_its_master_gives_up_after_its_watchdog() {
-    let lost = "[[disturbance]]\nkind = \"lost-telegrams\"\nto = 4\nfrom_cycle = 100\ncount = 150\n";
+    let lost = "[[disturbance]]\nkind = \"lost-telegrams\"\nto = 4\ncycle = 100\nfor = 150\n";
     let sync = event(90, "\"sync\"\ngroups = [2]");
     let run = Run::of(&network(400, "watchdog = \"100 ms\"", "", &[&sync, lost].concat()));
     let left = run.events_of(4).find_map(|row| match row.what {

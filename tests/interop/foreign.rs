@@ -12,6 +12,7 @@ use isodp::device::unit::UnitSettings;
 use isodp::fdl::{Filter, Input, Outbox, Station, Timer};
 use isodp::observation::{Observation, SlaveCause, SlaveState};
 use isodp::sim::crystal::Crystal;
+use isodp::sim::fault::Faults;
 use isodp::sim::motion::{Angle, Motion, Resolution, Shaft};
 use isodp::sim::network::{Act, Network, Site, Until, When, Wiring};
 use isodp::sim::noise::{GcJitter, JitterSource};
@@ -323,7 +324,7 @@ struct Log {
 
 impl Recorder for Log {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
-        let &Transmission { start, end, sender, octets } = telegram;
+        let &Transmission { start, end, sender, octets, .. } = telegram;
         self.line.borrow_mut().push(Sent { start, end, sender: sender.get(), octets: octets.to_vec() });
     }
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
@@ -369,7 +370,7 @@ impl Bus {
             sites.push(site(Machine::Encoder(Box::new(unit)), Some((shaft, disc))));
         }
         let jitter = JitterSource::new(GcJitter::None, 1, MASTER).expect("no jitter");
-        let network = Network::new(rate, (Wiring::line(), sites), jitter, Vec::new());
+        let network = Network::new(rate, (Wiring::line(), sites), jitter, Faults::default());
         Self { network, log: Log { line, states: Vec::new() } }
     }
     /// A good configuration of encoders, all there.

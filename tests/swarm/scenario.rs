@@ -489,7 +489,7 @@ fn back_in_order(text: &mut String, patched: &[u8], to: Span, cycle: Span) {
 fn disturbance(draw: &mut Draw, text: &mut String, network: &Network, (from, to): (i64, i64)) -> bool {
     let first = draw.within(from..=to - 20);
     let count = draw.within(1..=(to - first - 5).min(15));
-    let bursts = format!("from_cycle = {first}\ncount = {count}\n");
+    let bursts = format!("cycle = {first}\nfor = {count}\n");
     if network.clocked && draw.percent(40) {
         let _ = write!(text, "[[disturbance]]\nkind = \"missing-clocks\"\n{bursts}");
         return false;

@@ -8,7 +8,7 @@ use super::look::{WIDTH, text_width};
 use super::*;
 use crate::observation::{Disturbance, Inputs, Leds, Observation, Phase, PllState, SlaveCause, SlaveState};
 use crate::sim::crystal::Crystal;
-use crate::sim::record::{Recorder, Stamp, Transmission};
+use crate::sim::record::{Origin, Recorder, Stamp, Transmission};
 use crate::study::topology::{Segment, Station, Via};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::{Fcb, Frame, Header, Sap, Service, Status};
@@ -191,7 +191,7 @@ impl World {
             self.plots.event(&EventRow { at, cycle, station: address(station), what });
         };
         match cycle {
-            699 | 700 | 950 => event(2, Observation::Disturbed { how: Disturbance::Lost }),
+            699 | 700 | 950 => event(2, Observation::Disturbed { number: 0, how: Disturbance::Lost }),
             701 => event(4, Observation::Fault { code: 0x0F04 }),
             740 => event(4, Observation::Acknowledged { code: 0x0F04 }),
             900 => {
@@ -211,7 +211,13 @@ impl World {
     /// Puts a telegram on the line and lets the sender's clock run to its end.
     fn send(&mut self, sender: usize, frame: &Frame, then_bits: u32) -> Time {
         let (start, end) = (self.now, self.now + RATE.octets(frame.len()));
-        self.bus.telegram(&Transmission { start, end, sender: address(sender), octets: frame.octets() });
+        self.bus.telegram(&Transmission {
+            start,
+            end,
+            sender: address(sender),
+            octets: frame.octets(),
+            origin: Origin::Sender,
+        });
         self.now = end + RATE.span(crate::time::Tbit(then_bits));
         end
     }

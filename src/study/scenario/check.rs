@@ -4,12 +4,13 @@
 use super::class1;
 use super::class2;
 use super::error::{Fault, Problem};
+use super::expect;
 use super::gsd;
 use super::section::Reader;
 use super::services;
 use super::topology;
 use super::tree::Place;
-use super::{Action, CodeSequence, Crystal, Disturbance, Extent, Link, Run, Sample, Scenario, Slave, When};
+use super::{Action, CodeSequence, Crystal, Extent, LineFault, Link, Run, Sample, Scenario, Slave, What, When};
 use crate::device::options::Resolution;
 use crate::sim::motion;
 use crate::study::plan::finding::{Finding, Subject};
@@ -60,7 +61,7 @@ static STAGES: &[Stage] = &[
     Stage::own(&[sample_lengths, destinations, told_lengths]),
     Stage::own(&[gsd::set_prm_length]),
     Stage::own(&[event_stations, class1::event_stations, gsd::acyclic_devices, event_instants]),
-    Stage::own(&[disturbance_stations, services::commands]),
+    Stage::own(&[disturbance_stations, services::commands, expect::subjects]),
     Stage { own: &[], planned: &[rules::START_UP] },
 ];
 
@@ -491,7 +492,7 @@ fn event_instants(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
-        let Disturbance::LostTelegrams { from, to, .. } = disturbance else { continue };
+        let What::Line(LineFault::LostTelegrams { from, to, .. }) = &disturbance.what else { continue };
         for (key, station) in [("from", from), ("to", to)] {
             if let Some(address) = *station
                 && address != facts.scenario.master.address

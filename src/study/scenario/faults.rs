@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::sim::motion::Angle;
+use crate::study::scenario::disturbance::DISTURBANCES;
 use crate::time::BitRate;
 use proptest::prelude::*;
 
@@ -48,7 +49,8 @@ for = 2
 
 [[disturbance]]
 kind = "missing-clocks"
-from_cycle = 1000
+cycle = 1000
+for = 1
 every = 100
 
 [record]
@@ -639,8 +641,8 @@ good.toml:36:6: event.1.at: the run is over before this event
             "every = 100",
             "every = 0",
             r"
-good.toml:44:9: disturbance.1.every: 0 is out of range
-  44 | every = 0
+good.toml:45:9: disturbance.1.every: 0 is out of range
+  45 | every = 0
      |         ^
   help: a whole number from 1 to 9223372036854775807
 ",
@@ -904,7 +906,7 @@ fn a_subscriber_has_at_most_29_links() {
 fn a_good_file_becomes_a_scenario() {
     let scenario = good(&[]);
     assert_eq!(scenario.question, "Does a clock lost every 100 cycles trip 0F04?\nExpected: no. Source: Model: D15.");
-    assert_eq!(scenario.run, Run { seed: 7, duration: Extent::Time(Span::from_s(20)) });
+    assert_eq!(scenario.run, Run { seed: 7, duration: Extent::Time(Span::from_s(20)), max_events: None });
     assert_eq!(scenario.bus, Bus { params: BusParams::profile(BitRate::M12), cable_mm: 100_000 });
     assert_eq!(scenario.master.t_dp, Span::from_ms(4));
     let (sigma, bound) = (Span::from_ns(100), Span::from_ns(400));
@@ -917,8 +919,9 @@ fn a_good_file_becomes_a_scenario() {
     assert_eq!(scenario.links, [Link::of(publisher, subscriber, 4, 4)]);
     let action = Action::HoldLifeSign { cycles: Some(2) };
     assert_eq!(scenario.events, [Event { when: When::Time(Span::from_s(1)), slaves: vec![publisher], action }]);
-    let bursts = Bursts { from_cycle: 1_000, count: 1, every: Some(100) };
-    assert_eq!(scenario.disturbances, [Disturbance::MissingClocks { bursts }]);
+    let window = Window::Cycles(Bursts { from: 1_000, length: Some(1), every: Some(100), times: None });
+    let what = What::Line(LineFault::MissingClocks);
+    assert_eq!(scenario.disturbances, [Disturbance { name: "missing-clocks".to_owned(), window, what }]);
     assert_eq!(scenario.record.tables, [CsvTable::Cycles, CsvTable::Slaves, CsvTable::Events]);
     assert!(scenario.publishes(publisher) && !scenario.publishes(subscriber));
 }
@@ -999,9 +1002,90 @@ fn every_kind_can_be_read() {
         let scenario = parse(&text, &sets).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(scenario.events[0].slaves.is_empty(), about.is_empty(), "{}", kind.name);
     }
-    for kind in kinds::DISTURBANCES {
-        good(&[("disturbance.1.kind", kind.name)]);
+}
+
+#[test]
+fn every_disturbance_can_be_written_as_its_example_says() {
+    let end = GOOD.find("[[disturbance]]").unwrap();
+    let rest = &GOOD[GOOD.find("[record]").unwrap()..];
+    for kind in DISTURBANCES {
+        let text = format!("disturbance = [{{ {} }}]\n{}{rest}", kind.example, &GOOD[..end]);
+        let scenario = parse(&text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(scenario.disturbances[0].name, kind.name);
+        let unread = kind.keys.iter().filter(|key| key.name.contains(' ')).count();
+        assert_eq!(unread, 0, "keys of {} are words", kind.name);
     }
+}
+
+#[test]
+fn windows_that_cannot_be() {
+    check(&[
+        (
+            "cycle = 1000",
+            "cycle = 1000\nat = \"1 s\"",
+            r"
+good.toml:41:1: disturbance.1: a disturbance begins either at an instant or in a cycle
+  41 | [[disturbance]]
+     | ^^^^^^^^^^^^^^^
+  help: leave out at, or leave out cycle
+",
+        ),
+        (
+            "for = 1\nevery",
+            "every",
+            r"
+good.toml:41:1: disturbance.1: every without for says nothing
+  41 | [[disturbance]]
+     | ^^^^^^^^^^^^^^^
+  help: add for, or leave out every
+",
+        ),
+        (
+            "for = 1\n",
+            "for = \"1 ms\"\n",
+            r#"
+good.toml:44:7: disturbance.1.for: this is a time, but the disturbance begins in a cycle
+  44 | for = "1 ms"
+     |       ^^^^^^
+  help: a whole number of cycles
+"#,
+        ),
+        (
+            "cycle = 1000",
+            "at = \"1 s\"",
+            r#"
+good.toml:44:7: disturbance.1.for: this is a number, but the disturbance begins at an instant
+  44 | for = 1
+     |       ^
+  help: a time with its unit, such as "20 ms"
+
+good.toml:45:9: disturbance.1.every: this is a number, but the disturbance begins at an instant
+  45 | every = 100
+     |         ^^^
+  help: a time with its unit, such as "20 ms"
+"#,
+        ),
+        (
+            "cycle = 1000\nfor = 1\nevery = 100",
+            "at = \"1 s\"\nfor = \"2 ms\"\nevery = \"1 ms\"",
+            r#"
+good.toml:45:9: disturbance.1.every: 1 ms is too short
+  45 | every = "1 ms"
+     |         ^^^^^^
+  help: at least 2 ms
+"#,
+        ),
+        (
+            "every = 100",
+            "every = 100\nname = \"x\"\n[[disturbance]]\nkind = \"missing-clocks\"\nname = \"x\"",
+            r#"
+good.toml:49:8: disturbance.2.name: two disturbances are called "x"
+  49 | name = "x"
+     |        ^^^
+  rule: the draws of a disturbance hang on its name, so that each needs its own
+"#,
+        ),
+    ]);
 }
 
 #[test]

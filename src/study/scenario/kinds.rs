@@ -4,7 +4,7 @@ use super::error::Fault;
 use super::section::{Reader, Section, choice, instant, number, quantity};
 use super::services::command;
 use super::tree::{Node, Value};
-use super::{Action, Bursts, Disturbance, Format, Patch, Service, StartupTelegram};
+use super::{Action, Format, Patch, StartupTelegram};
 use crate::sim::motion::{Angle, Motion, Shaft};
 use crate::sim::noise::{GcJitter, KINDS as JITTERS};
 use crate::study::quantity::{angle, micro_rpm};
@@ -122,19 +122,6 @@ pub const ACTIONS: &[Kind<Action>] = &[
     },
 ];
 
-/// What can go wrong on the line.
-pub const DISTURBANCES: &[Kind<Disturbance>] = &[
-    Kind { name: "missing-clocks", what: "the master's SYNCH never reaches the line", read: missing_clocks },
-    Kind {
-        name: "lost-telegrams",
-        what: "telegrams `from` one station `to` another reach nobody",
-        read: lost_telegrams,
-    },
-];
-
-/// Services that a disturbance can be about.
-const SERVICES: &[(&str, Service)] = &[("data-exchange", Service::DataExchange), ("any", Service::Any)];
-
 #[expect(clippy::unnecessary_wraps, reason = "the signature of all kinds")]
 fn standstill(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Motion> {
     let at = section.optional(reader, "at", quantity("0.25 rev", angle)).unwrap_or_default();
@@ -245,25 +232,6 @@ fn octets(node: &Node) -> Result<Patch, Fault> {
         }
     }
     Ok(patch)
-}
-
-fn missing_clocks(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Disturbance> {
-    Some(Disturbance::MissingClocks { bursts: bursts(section, reader)? })
-}
-fn lost_telegrams(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Disturbance> {
-    let from = section.optional(reader, "from", address);
-    let to = section.optional(reader, "to", address);
-    let service = |node: &Node| choice(node, "service", SERVICES, |row| row.0);
-    let service = section.optional(reader, "service", service).map_or(Service::Any, |row| row.1);
-    Some(Disturbance::LostTelegrams { from, to, service, bursts: bursts(section, reader)? })
-}
-/// The cycles of a disturbance.
-fn bursts(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Bursts> {
-    let cycles = |min| number(min..=i64::MAX as u64);
-    let from_cycle = section.required(reader, "from_cycle", "1000", cycles(0));
-    let count = section.optional(reader, "count", cycles(1)).unwrap_or(1);
-    let every = section.optional(reader, "every", cycles(count));
-    Some(Bursts { from_cycle: from_cycle?, count, every })
 }
 
 /// The address of a station.

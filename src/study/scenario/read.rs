@@ -3,9 +3,11 @@
 use super::acyclic;
 use super::class1;
 use super::class2;
+use super::disturbance;
 use super::error::Fault;
+use super::expect;
 use super::gsd;
-use super::kinds::{self, ACTIONS, DISTURBANCES, Kind, address};
+use super::kinds::{self, ACTIONS, Kind, address};
 use super::link::link;
 use super::options;
 use super::section::{Reader, Section, cycle_time, instant, number, quantity, suggestion, text, yes};
@@ -27,11 +29,12 @@ use crate::time::{BitRate, Span, Tbit};
 use crate::wire::Address;
 
 /// The tables of a file; the second half is lists, `[[slave]]`.
-const TABLES: [&str; 12] = [
+const TABLES: [&str; 13] = [
     "run",
     "bus",
     "master",
     "record",
+    expect::EXPECT,
     "segment",
     "repeater",
     "slave",
@@ -42,7 +45,7 @@ const TABLES: [&str; 12] = [
     "disturbance",
 ];
 /// How many of [`TABLES`] are single tables.
-const SINGLE: usize = 4;
+const SINGLE: usize = 5;
 
 /// A slave's table after its list of addresses has been written out: one per slave.
 struct SlaveTable {
@@ -84,8 +87,9 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses, topology.as_ref()));
     let links = list(reader, &root, "link", link);
     let events = list(reader, &root, "event", |section, reader| event(section, reader, &addresses));
-    let disturbances = list(reader, &root, "disturbance", disturbance);
+    let disturbances = disturbances(reader, &root);
     let record = record(Section::of_file(reader, &root, "record"), reader);
+    let expectations = expect::read(reader, &root, rate);
     let mut scenario = Scenario {
         name: String::new(),
         question: String::new(),
@@ -100,6 +104,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         events,
         disturbances,
         record,
+        expectations,
     };
     if scenario.master.pace != Pace::Synch {
         scenario.master.t_dp = Plan::of(&scenario).free_running(&scenario).with_gap();
@@ -149,6 +154,16 @@ pub(super) fn list<T>(
     sections
         .filter_map(|(i, (place, table))| read(Section::new(format!("{name}.{}", i + 1), place, Some(table)), reader))
         .collect()
+}
+
+/// Reads every `[[disturbance]]`; a name is taken once.
+fn disturbances(reader: &mut Reader<'_>, root: &Table) -> Vec<Disturbance> {
+    let mut all = Vec::new();
+    for (i, (place, table)) in tables(reader, root, "disturbance").into_iter().enumerate() {
+        let section = Section::new(format!("disturbance.{}", i + 1), place, Some(table));
+        all.extend(disturbance::read(section, reader, &all));
+    }
+    all
 }
 
 /// Writes out the addresses of every `[[slave]]`, in address order; of two slaves at one address the first comes first.
@@ -231,6 +246,10 @@ fn overrides(reader: &mut Reader<'_>, root: &mut Table, slaves: &mut [SlaveTable
                     let fault = Fault::new(format!("no slave has the address \"{station}\""));
                     Err(fault.help(format!("the slaves are {}", all.join(", "))))
                 }
+            }
+            [expect::EXPECT, ref rest @ ..] if !rest.is_empty() => {
+                expect::put(root, &rest.join("."), &set.node);
+                Ok(())
             }
             [name, index, ref rest @ ..] if TABLES[SINGLE..].contains(&name) => match entry(root, name, index) {
                 Some(table) => put(table, rest, &set.node),
@@ -320,9 +339,10 @@ fn run(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Run> {
         let fault = Fault::new("a run has either duration or cycles");
         section.complain(reader, fault.help("for example: duration = \"20 s\", or cycles = 10000"));
     }
+    let max_events = section.optional(reader, "max_events", number(1..=u64::MAX));
     section.finish(reader);
     let duration = time.map(Extent::Time).or(cycles.map(Extent::Cycles))?;
-    Some(Run { seed, duration })
+    Some(Run { seed, duration, max_events })
 }
 
 /// Reads `[bus]`.
@@ -647,13 +667,6 @@ pub(super) fn targets(noun: &str, reader: &mut Reader<'_>, section: &mut Section
         section.complain(reader, fault.help("for example: slave = 3, slaves = \"3..10\", or slaves = \"all\""));
     }
     one.into_iter().chain(many.into_iter().flatten()).collect()
-}
-
-/// Reads one `[[disturbance]]`.
-fn disturbance(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Disturbance> {
-    let disturbance = Kind::read(DISTURBANCES, "disturbance", "kind", &mut section, reader)?;
-    section.finish(reader);
-    Some(disturbance)
 }
 
 /// Reads `[record]`.
