@@ -4,6 +4,7 @@ mod acyclic;
 mod cli;
 mod determinism;
 mod devices;
+mod disturbances;
 mod dp_services;
 mod dxb;
 mod encoder;

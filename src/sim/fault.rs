@@ -3,10 +3,18 @@
 //! A disturbance changes octets and instants on the line, or orders something of a station's surroundings; it never
 //! reaches into a machine. What it draws belongs to its name, so that one more leaves the others' draws as they are.
 
+pub mod clock;
 pub mod line;
+pub mod order;
+pub mod station;
+pub mod turn;
 pub mod window;
 
+use crate::sim::fault::clock::{CrystalFault, Pull};
 use crate::sim::fault::line::{LineFault, OnLine};
+use crate::sim::fault::order::OrderFault;
+use crate::sim::fault::station::{Apart, StationFault};
+use crate::sim::fault::turn::Turns;
 use crate::sim::fault::window::Window;
 use crate::time::Time;
 use crate::wire::Address;
@@ -27,25 +35,69 @@ pub struct Disturbance {
 pub enum What {
     /// It decides what becomes of telegrams.
     Line(LineFault),
+    /// It takes stations off the line, or their supply away.
+    Station(Vec<Address>, StationFault),
+    /// It changes the rate of crystals.
+    Crystal(Vec<Address>, CrystalFault),
+    /// It orders something of the masters of these slaves.
+    Order(Vec<Address>, OrderFault),
+}
+
+impl What {
+    /// The stations that it means, where it names them.
+    pub fn stations(&self) -> &[Address] {
+        match self {
+            Self::Line(_) => &[],
+            Self::Station(stations, _) | Self::Crystal(stations, _) | Self::Order(stations, _) => stations,
+        }
+    }
+}
+
+/// A disturbance that begins and ends.
+#[derive(Clone, Debug)]
+pub(super) struct Turning {
+    /// Number of the disturbance in the scenario, from 0.
+    pub number: u16,
+    pub turns: Turns,
+    pub what: What,
+    /// What it makes of each station's crystal, in the order of the stations.
+    pub pulls: Vec<Pull>,
 }
 
 /// All disturbances of a network at work.
 #[derive(Clone, Debug, Default)]
 pub struct Faults {
     line: Vec<OnLine>,
+    apart: Vec<Apart>,
+    turning: Vec<Turning>,
 }
 
 impl Faults {
-    /// The disturbances of a run, in the order of the scenario.
-    pub fn new(disturbances: &[Disturbance]) -> Self {
+    /// The disturbances of a run with `seed`, in the order of the scenario.
+    pub fn new(disturbances: &[Disturbance], seed: u64) -> Self {
         let mut faults = Self::default();
-        for (number, Disturbance { window, what, .. }) in disturbances.iter().enumerate() {
+        for (number, Disturbance { name, window, what }) in disturbances.iter().enumerate() {
             let number = number as u16;
             match what {
                 What::Line(fault) => faults.line.push(OnLine { number, window: *window, fault: *fault }),
+                What::Station(stations, fault) => faults.apart.push(Apart::new(stations, *window, *fault)),
+                What::Crystal(..) | What::Order(..) => {}
             }
+            if matches!(what, What::Line(_)) {
+                continue;
+            }
+            let pull = |&station| match what {
+                What::Crystal(_, fault) => Some(Pull::new(*fault, seed, name, station)),
+                _ => None,
+            };
+            let pulls = what.stations().iter().filter_map(pull).collect();
+            faults.turning.push(Turning { number, turns: Turns::new(*window), what: what.clone(), pulls });
         }
         faults
+    }
+    /// Hands over what begins and ends.
+    pub(super) fn take_turning(&mut self) -> Vec<Turning> {
+        std::mem::take(&mut self.turning)
     }
 
     /// Number of the disturbance that loses this telegram, if one does. `clock` marks SYNCH; `cycle` is the running
@@ -53,5 +105,14 @@ impl Faults {
     pub fn loses(&self, (now, cycle): (Time, u64), sender: Address, clock: bool, octets: &[u8]) -> Option<u16> {
         let lost = |line: &&OnLine| line.window.contains(now, cycle) && line.fault.loses(sender, clock, octets);
         self.line.iter().find(lost).map(|line| line.number)
+    }
+
+    /// Whether nothing that `station` sends now, in the cycle of this number, reaches the line.
+    pub fn mutes(&self, station: Address, running: (Time, u64)) -> bool {
+        self.apart.iter().any(|apart| apart.mutes(station, running))
+    }
+    /// Whether `station` hears nothing now, in the cycle of this number.
+    pub fn deafens(&self, station: Address, running: (Time, u64)) -> bool {
+        self.apart.iter().any(|apart| apart.deafens(station, running))
     }
 }

@@ -1,7 +1,10 @@
 //! Disturbances: the tables `[[disturbance]]`, each with a kind, a name and a window. A new kind is a line of the
 //! registry and a row beside the kinds of its family.
 
+pub(super) mod application;
+pub(super) mod clock;
 mod line;
+pub(super) mod station;
 
 use super::error::Fault;
 use super::section::{Reader, Section, choice, instant, number, text};
@@ -39,7 +42,21 @@ pub struct Key {
 }
 
 /// Every kind.
-pub const DISTURBANCES: &[DisturbanceKind] = &[line::MISSING_CLOCKS, line::LOST_TELEGRAMS];
+pub const DISTURBANCES: &[DisturbanceKind] = &[
+    line::MISSING_CLOCKS,
+    line::LOST_TELEGRAMS,
+    station::SILENT,
+    station::MUTE,
+    station::DEAF,
+    station::RESTART,
+    clock::CRYSTAL_OFFSET,
+    clock::CRYSTAL_WANDER,
+    clock::TEMPERATURE_STEP,
+    application::HOLD_LIFE_SIGN,
+    application::JUMP_LIFE_SIGN,
+    application::REPEAT_LIFE_SIGN,
+    application::WRONG_PARAMETERS,
+];
 
 /// The keys of every disturbance.
 pub const COMMON: &[Key] = &[

@@ -77,7 +77,7 @@ pub(super) fn change_line<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>
         network.change_jitter(altered.master.gc_jitter).expect("a checked jitter");
     }
     if altered.disturbances != original.disturbances {
-        network.set_faults(Faults::new(&altered.disturbances));
+        network.set_faults(Faults::new(&altered.disturbances, altered.run.seed));
     }
 }
 
