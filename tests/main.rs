@@ -29,3 +29,4 @@ mod startup;
 mod support;
 mod swarm;
 mod topology;
+mod verdicts;

@@ -572,7 +572,7 @@ mod tests {
             self.tell(at, station, Observation::Pll { from: PllState::Idle, to });
         }
         fn lost(&mut self, at: i64) {
-            self.tell(at, MASTER, Observation::Disturbed { how: Disturbance::Lost });
+            self.tell(at, MASTER, Observation::Disturbed { number: 0, how: Disturbance::Lost });
         }
         fn fault(&mut self, at: i64, station: u8, code: u16) {
             self.tell(at, station, Observation::Fault { code });

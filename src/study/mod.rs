@@ -2,6 +2,7 @@
 //! threads and reports.
 
 pub mod acyclic;
+pub mod batch;
 pub mod build;
 pub mod count;
 pub mod devices;
