@@ -31,4 +31,5 @@ mod statistics;
 mod support;
 mod swarm;
 mod topology;
+mod verdicts;
 mod what_if;
