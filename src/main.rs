@@ -66,8 +66,8 @@ enum Command {
     Replay(ReplayArgs),
     /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
-    /// Lists the disturbances that a scenario can name, with their keys and an example of each.
-    Disturbances,
+    /// Lists the disturbances that a scenario can name, with their keys and an example of each, or tells about one.
+    Disturbances(DisturbancesArgs),
     /// Shows what a GSD file says, what of it is ignored and what does not fit.
     #[command(after_help = GSD_CODES)]
     Gsd(GsdArgs),
@@ -76,6 +76,13 @@ enum Command {
 #[derive(Args)]
 struct DevicesArgs {
     /// The device to tell about.
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
+}
+
+#[derive(Args)]
+struct DisturbancesArgs {
+    /// The disturbance to tell about.
     #[arg(value_name = "NAME")]
     name: Option<String>,
 }
@@ -161,7 +168,7 @@ fn main() -> ExitCode {
         Command::Plan(args) => plan_command(args),
         Command::Replay(args) => replay_command(args).map(done),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
-        Command::Disturbances => Ok(done(disturbance::list())),
+        Command::Disturbances(args) => disturbances_command(args.name.as_deref()).map(done),
         Command::Gsd(args) => gsd_command(&args.file),
     };
     match result.and_then(|(page, code)| show(&page).map(|()| code)) {
@@ -211,6 +218,10 @@ fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error
 
 fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
     Ok(name.map_or_else(|| Ok(devices::list()), devices::full)?)
+}
+
+fn disturbances_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
+    Ok(name.map_or_else(|| Ok(disturbance::list()), disturbance::full)?)
 }
 
 fn replay_command(args: ReplayArgs) -> Result<String, Box<dyn std::error::Error>> {

@@ -732,6 +732,12 @@ named! {
     Disturbance {
         /// It never reached the line.
         Lost = "telegram lost",
+        /// It left late.
+        Late = "telegram late",
+        /// It comes a second time.
+        Doubled = "telegram doubled",
+        /// Some of its bits are wrong.
+        WrongBits = "wrong bits",
     }
 }
 

@@ -4,9 +4,13 @@
 //! number on the line, a station's other events are numbered by this station alone. Only the order of numbers matters,
 //! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
+mod disturbed;
+
+use disturbed::Held;
+
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
-use crate::observation::{self, Observation};
-use crate::sim::bus::{Bus, FlightId};
+use crate::observation::Observation;
+use crate::sim::bus::{Bus, Flight, FlightId};
 use crate::sim::crystal::Crystal;
 use crate::sim::fault::Faults;
 use crate::sim::motion::{Resolution, Shaft};
@@ -99,6 +103,8 @@ enum Event {
     Broadcast(FlightId, u8),
     Sent,
     Deadline(u8),
+    /// A telegram that a disturbance has held up, or made, leaves.
+    Held(u16),
 }
 
 struct Slot<S> {
@@ -128,6 +134,7 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     queue: Q,
     jitter: JitterSource,
     faults: Faults,
+    held: Held,
     acts: Vec<(usize, Act<S::Command>)>,
     /// Acts bound to cycles, by cycle.
     cycle_acts: Vec<(u64, usize)>,
@@ -182,6 +189,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             queue: Q::default(),
             jitter,
             faults,
+            held: Held::default(),
             acts: Vec::new(),
             cycle_acts: Vec::new(),
             next_cycle_act: 0,
@@ -257,6 +265,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
             Event::Sent => self.sent(slot, recorder),
             Event::Deadline(which) => self.deadline(slot, usize::from(which), recorder),
+            Event::Held(which) => self.release(slot, usize::from(which), recorder),
         }
         true
     }
@@ -299,7 +308,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         // Without octets it was cut off before it began.
         if station.powered && !self.bus.flight(id).frame.is_empty() {
             self.out.clear();
-            let octets = self.bus.flight(id).frame.octets();
+            let flight = self.bus.flight(id);
+            let octets = if flight.broken { &[] } else { flight.frame.octets() };
             let input = Input::Telegram(Heard { octets, sample });
             self.slots[slot].site.machine.step(now, input, &mut self.out);
             self.bus.heard(id);
@@ -411,8 +421,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Puts the telegram in the outbox, if there is one, onto the line.
     fn transmit<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
         let Some((send, frame)) = self.out.sending() else { return };
-        let Slot { site, address, .. } = &self.slots[slot];
-        let address = *address;
+        let Slot { site, .. } = &self.slots[slot];
         let mut start = site.crystal.to_true(send.at);
         let mut end = site.crystal.to_true(send.at + self.rate.octets(frame.len()));
         if send.clock {
@@ -420,20 +429,22 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             start += jitter;
             end += jitter;
         }
-        let running = (start, self.clocks_begun(send.clock));
-        let lost = self.faults.loses(running, address, send.clock, frame.octets());
         if send.clock {
             // The master's transmitter runs, whatever becomes of the telegram.
             self.begin_cycle(slot, end);
         }
-        if let Some(number) = lost {
-            let how = observation::Disturbance::Lost;
-            return self.tell(slot, &Observation::Disturbed { number, how }, recorder);
+        if !self.faults.line.is_idle() {
+            return self.transmit_disturbed(slot, (start, end), send.clock, recorder);
         }
         let Some((_, frame)) = self.out.sending() else { return };
-        let (octets, origin) = (frame.octets(), Origin::Sender);
-        recorder.telegram(&Transmission { start, end, sender: address, octets, origin });
-        let (id, hit) = self.bus.send(slot, (start, end), frame);
+        let flight = self.bus.send(slot, (start, end), frame, (Origin::Sender, false));
+        self.sent_off(slot, flight, recorder);
+    }
+    /// Tells that a telegram is on the line, and its listeners when its end will reach them.
+    fn sent_off<R: Recorder>(&mut self, slot: usize, (id, hit): (FlightId, Option<usize>), recorder: &mut R) {
+        let sender = self.slots[slot].address;
+        let Flight { start, end, origin, ref frame, .. } = *self.bus.flight(id);
+        recorder.telegram(&Transmission { start, end, sender, octets: frame.octets(), origin });
         if let Some(with) = hit {
             self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
         }

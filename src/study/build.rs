@@ -14,6 +14,7 @@ use crate::dp::handler::SlaveParams;
 use crate::dp::iso::Rearm;
 use crate::dp::master::{Master, Pace, Settings};
 use crate::dp::ms2::{self, client};
+use crate::fdl::Station;
 use crate::observation::MasterMode;
 use crate::sim::crystal::Crystal;
 use crate::sim::fault::Faults;
@@ -187,8 +188,9 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
-    let mut network =
-        Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, Faults::new(&scenario.disturbances));
+    let stations: Vec<_> = sites.iter().map(|site| site.machine.address()).collect();
+    let faults = Faults::new(&scenario.disturbances, seed, &stations);
+    let mut network = Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, faults);
     for event in &scenario.events {
         let when = match event.when {
             When::Time(span) => network::When::Time(Time::ZERO + span),
