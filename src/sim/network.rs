@@ -21,6 +21,8 @@ use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::Address;
 
+mod alter;
+
 /// One station and the world around it.
 #[derive(Clone, Debug)]
 pub struct Site<S> {
@@ -107,6 +109,7 @@ enum Event {
     Held(u16),
 }
 
+#[derive(Clone)]
 struct Slot<S> {
     site: Site<S>,
     address: Address,
@@ -120,7 +123,8 @@ struct Slot<S> {
     number: u64,
 }
 
-/// A network in time. `Q` is the event queue; any queue gives the same run.
+/// A network in time. `Q` is the event queue; any queue gives the same run. A clone goes on as the original does.
+#[derive(Clone)]
 pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     rate: BitRate,
     slots: Vec<Slot<S>>,
@@ -136,6 +140,8 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     faults: Faults,
     held: Held,
     acts: Vec<(usize, Act<S::Command>)>,
+    /// Which of them do not count any more.
+    cancelled: core::ops::Range<usize>,
     /// Acts bound to cycles, by cycle.
     cycle_acts: Vec<(u64, usize)>,
     next_cycle_act: usize,
@@ -191,6 +197,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             faults,
             held: Held::default(),
             acts: Vec::new(),
+            cancelled: 0..0,
             cycle_acts: Vec::new(),
             next_cycle_act: 0,
             now: Time::ZERO,
@@ -257,6 +264,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.now = key.time();
         let slot = usize::from(self.by_address[usize::from(key.station())].expect("events belong to stations"));
         match event {
+            Event::Act(act) if self.cancelled.contains(&(act as usize)) => {}
             Event::Act(act) => self.act(act as usize, recorder),
             Event::Telegram(id) => self.telegram(slot, id, recorder),
             Event::Broadcast(id, rank) => {

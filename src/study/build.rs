@@ -14,7 +14,6 @@ use crate::dp::handler::SlaveParams;
 use crate::dp::iso::Rearm;
 use crate::dp::master::{Master, Pace, Settings};
 use crate::dp::ms2::{self, client};
-use crate::fdl::Station;
 use crate::observation::MasterMode;
 use crate::sim::crystal::Crystal;
 use crate::sim::fault::Faults;
@@ -24,7 +23,7 @@ use crate::sim::noise::{JitterSource, LinkJitter, Purpose, Stream};
 use crate::sim::queue::Queue;
 use crate::sim::topology::Place;
 use crate::study::plan::{self, Plan};
-use crate::study::scenario::{self, Action, Class1, CodeSequence, Scenario, Slave, When};
+use crate::study::scenario::{self, Action, Class1, CodeSequence, Event, Scenario, Slave, When};
 use crate::time::{Local, Span, Time};
 use crate::wire::Address;
 use crate::wire::drive::G1Stw;
@@ -188,10 +187,20 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
-    let stations: Vec<_> = sites.iter().map(|site| site.machine.address()).collect();
-    let faults = Faults::new(&scenario.disturbances, seed, &stations);
-    let mut network = Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, faults);
-    for event in &scenario.events {
+    let mut network = Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, faults(scenario));
+    order(&mut network, scenario, &scenario.events);
+    network
+}
+
+/// The disturbances of a scenario at work, with the draws of its seed for each of its stations.
+pub fn faults(scenario: &Scenario) -> Faults {
+    let stations: Vec<_> = scenario.stations().map(|station| station.address).collect();
+    Faults::new(&scenario.disturbances, scenario.run.seed, &stations)
+}
+
+/// Gives `network` the orders of `events`, which are events of `scenario`.
+pub fn order<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &Scenario, events: &[Event]) {
+    for event in events {
         let when = match event.when {
             When::Time(span) => network::When::Time(Time::ZERO + span),
             When::Cycle(cycle) => network::When::Cycle(cycle),
@@ -200,7 +209,6 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
             network.order(when, station, act);
         }
     }
-    network
 }
 
 /// The cables; every repeater with jitter has its own draws, by its name.
@@ -336,16 +344,19 @@ fn limits_of(scenario: &Scenario, slave: Address) -> AcyclicLimits {
 
 /// A station's crystal: its offset set or drawn, its start always drawn.
 fn crystal(seed: u64, station: Address, crystal: scenario::Crystal) -> Crystal {
-    let ppb = match crystal {
+    let mut stream = Stream::new(seed, station.get(), Purpose::CrystalStart);
+    let start = Local::from_ticks(stream.below(CLOCK_START.ticks() as u64) as i64);
+    Crystal::new(crystal_offset(seed, station, crystal), start).expect("a checked offset")
+}
+/// How far a station's crystal is off (10^-9).
+pub fn crystal_offset(seed: u64, station: Address, crystal: scenario::Crystal) -> i64 {
+    match crystal {
         scenario::Crystal::Offset(ppb) => ppb,
         scenario::Crystal::Within(ppb) => {
             let mut stream = Stream::new(seed, station.get(), Purpose::CrystalOffset);
             stream.uniform(Span::from_ticks(ppb)).ticks()
         }
-    };
-    let mut stream = Stream::new(seed, station.get(), Purpose::CrystalStart);
-    let start = Local::from_ticks(stream.below(CLOCK_START.ticks() as u64) as i64);
-    Crystal::new(ppb, start).expect("a checked offset")
+    }
 }
 
 /// An action as orders to stations.

@@ -4,6 +4,7 @@
 use super::class1;
 use super::class2;
 use super::error::{Fault, Problem};
+use super::expect;
 use super::gsd;
 use super::section::Reader;
 use super::services;
@@ -60,7 +61,7 @@ static STAGES: &[Stage] = &[
     Stage::own(&[sample_lengths, destinations, told_lengths]),
     Stage::own(&[gsd::set_prm_length]),
     Stage::own(&[event_stations, class1::event_stations, gsd::acyclic_devices, event_instants]),
-    Stage::own(&[disturbance_stations, services::commands]),
+    Stage::own(&[disturbance_stations, services::commands, expect::subjects]),
     Stage { own: &[], planned: &[rules::START_UP] },
 ];
 
