@@ -5,6 +5,7 @@ mod cli;
 mod determinism;
 mod devices;
 mod disturbance_list;
+mod disturbances;
 mod dp_services;
 mod dxb;
 mod encoder;

@@ -3,14 +3,23 @@
 //! A disturbance changes octets and instants on the line, or orders something of a station's surroundings; it never
 //! reaches into a machine. What it draws belongs to its name, so that one more leaves the others' draws as they are.
 
+pub mod clock;
 pub mod damage;
 pub mod line;
 pub mod manner;
+pub mod order;
+pub mod station;
+pub mod turn;
 pub mod which;
 pub mod window;
 
+use crate::sim::fault::clock::{CrystalFault, Pull};
 use crate::sim::fault::line::{Line, LineFault};
+use crate::sim::fault::order::OrderFault;
+use crate::sim::fault::station::{Apart, StationFault};
+use crate::sim::fault::turn::Turns;
 use crate::sim::fault::window::Window;
+use crate::time::Time;
 use crate::wire::Address;
 
 /// One disturbance of a scenario.
@@ -29,6 +38,33 @@ pub struct Disturbance {
 pub enum What {
     /// It decides what becomes of telegrams.
     Line(LineFault),
+    /// It takes stations off the line, or their supply away.
+    Station(Vec<Address>, StationFault),
+    /// It changes the rate of crystals.
+    Crystal(Vec<Address>, CrystalFault),
+    /// It orders something of the masters of these slaves.
+    Order(Vec<Address>, OrderFault),
+}
+
+impl What {
+    /// The stations that it means, where it names them.
+    pub fn stations(&self) -> &[Address] {
+        match self {
+            Self::Line(_) => &[],
+            Self::Station(stations, _) | Self::Crystal(stations, _) | Self::Order(stations, _) => stations,
+        }
+    }
+}
+
+/// A disturbance that begins and ends.
+#[derive(Clone, Debug)]
+pub(super) struct Turning {
+    /// Number of the disturbance in the scenario, from 0.
+    pub number: u16,
+    pub turns: Turns,
+    pub what: What,
+    /// What it makes of each station's crystal, in the order of the stations.
+    pub pulls: Vec<Pull>,
 }
 
 /// All disturbances of a network at work.
@@ -36,6 +72,8 @@ pub enum What {
 pub struct Faults {
     /// Those of the line.
     pub line: Line,
+    apart: Vec<Apart>,
+    turning: Vec<Turning>,
 }
 
 impl Faults {
@@ -46,8 +84,31 @@ impl Faults {
             let number = number as u16;
             match what {
                 What::Line(fault) => faults.line.add((number, name, *window), *fault, (seed, stations)),
+                What::Station(stations, fault) => faults.apart.push(Apart::new(stations, *window, *fault)),
+                What::Crystal(..) | What::Order(..) => {}
             }
+            if matches!(what, What::Line(_)) {
+                continue;
+            }
+            let pull = |&station| match what {
+                What::Crystal(_, fault) => Some(Pull::new(*fault, seed, name, station)),
+                _ => None,
+            };
+            let pulls = what.stations().iter().filter_map(pull).collect();
+            faults.turning.push(Turning { number, turns: Turns::new(*window), what: what.clone(), pulls });
         }
         faults
+    }
+    /// Hands over what begins and ends.
+    pub(super) fn take_turning(&mut self) -> Vec<Turning> {
+        std::mem::take(&mut self.turning)
+    }
+    /// Whether nothing that `station` sends now, in the cycle of this number, reaches the line.
+    pub fn mutes(&self, station: Address, running: (Time, u64)) -> bool {
+        self.apart.iter().any(|apart| apart.mutes(station, running))
+    }
+    /// Whether `station` hears nothing now, in the cycle of this number.
+    pub fn deafens(&self, station: Address, running: (Time, u64)) -> bool {
+        self.apart.iter().any(|apart| apart.deafens(station, running))
     }
 }

@@ -10,7 +10,7 @@ use std::hash::Hasher;
 use twox_hash::XxHash64;
 
 use super::record::{Recorder, Stamp, Transmission};
-use crate::observation::Observation;
+use crate::observation::{Disturbance, Observation};
 use crate::time::Time;
 use crate::wire::Address;
 
@@ -153,6 +153,8 @@ impl Recorder for Fingerprints {
                 latches.octets(&inputs.xist1.to_le_bytes());
                 latches.octets(&inputs.xist2.to_le_bytes());
             }
+            // What was done to a station shows in what it did.
+            Observation::Disturbed { how: Disturbance::Begins | Disturbance::Ends, .. } => {}
             event if event.is_event() => {
                 let states = &mut self.station(stamp.station).states;
                 states.instant(stamp.at);

@@ -5,8 +5,8 @@
 //! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
 mod disturbed;
-
-use disturbed::Held;
+mod tune;
+mod turn;
 
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
 use crate::observation::Observation;
@@ -20,6 +20,8 @@ use crate::sim::record::{Origin, Recorder, Stamp, Transmission};
 use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::Address;
+use disturbed::Held;
+use turn::Turning;
 
 mod alter;
 
@@ -107,6 +109,10 @@ enum Event {
     Deadline(u8),
     /// A telegram that a disturbance has held up, or made, leaves.
     Held(u16),
+    /// A disturbance of this number among those that turn does so.
+    Turn(u16),
+    /// A disturbance of this number among those that turn changes rates of crystals.
+    Step(u16),
 }
 
 #[derive(Clone)]
@@ -115,6 +121,13 @@ struct Slot<S> {
     address: Address,
     filter: Filter,
     powered: bool,
+    /// Its switch is on.
+    switched_on: bool,
+    /// Disturbances that keep its supply off.
+    outages: u16,
+    /// Offset of its crystal with what disturbances add (parts per billion), and whether it waits to be in force.
+    ppb: i64,
+    untuned: bool,
     /// When its next cycle begins, once that is known.
     cycle_at: Option<Time>,
     sample_with_telegrams: bool,
@@ -145,6 +158,9 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     /// Acts bound to cycles, by cycle.
     cycle_acts: Vec<(u64, usize)>,
     next_cycle_act: usize,
+    /// Disturbances that begin and end, and the first cycle in which one of them does.
+    turning: Vec<Turning<S::Command>>,
+    next_turn: u64,
     now: Time,
     /// Cycles that the first station has begun, with a lost SYNCH too.
     clocks: u64,
@@ -164,7 +180,12 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     ///
     /// # Panics
     /// If two stations have one address, or there are more than 127: the caller checks scenarios.
-    pub fn new(rate: BitRate, (wiring, sites): (Wiring, Vec<Site<S>>), jitter: JitterSource, faults: Faults) -> Self {
+    pub fn new(
+        rate: BitRate,
+        (wiring, sites): (Wiring, Vec<Site<S>>),
+        jitter: JitterSource,
+        mut faults: Faults,
+    ) -> Self {
         let places: Vec<_> = sites.iter().map(|site| site.place).collect();
         let mut by_address = [None; 128];
         let mut slots = Vec::with_capacity(sites.len());
@@ -173,18 +194,23 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let place = &mut by_address[usize::from(address.get())];
             assert!(place.is_none(), "two stations with address {address}");
             *place = Some(index as u8);
-            let filter = site.machine.filter();
+            let (filter, ppb) = (site.machine.filter(), site.crystal.ppb());
             slots.push(Slot {
                 site,
                 address,
                 filter,
                 powered: false,
+                switched_on: false,
+                outages: 0,
+                ppb,
+                untuned: false,
                 cycle_at: None,
                 sample_with_telegrams: false,
                 deadlines: [Deadline::default(); Outbox::DEADLINES],
                 number: 0,
             });
         }
+        let turning = faults.take_turning();
         let mut network = Self {
             rate,
             slots,
@@ -200,6 +226,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             cancelled: 0..0,
             cycle_acts: Vec::new(),
             next_cycle_act: 0,
+            turning: Vec::new(),
+            next_turn: u64::MAX,
             now: Time::ZERO,
             clocks: 0,
             out: Outbox::new(),
@@ -210,6 +238,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let (address, at) = (network.slots[index].address, network.slots[index].site.powered_at);
             network.order(When::Time(at), address, Act::PowerOn);
         }
+        network.disturb(turning);
         network
     }
 
@@ -274,6 +303,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Event::Sent => self.sent(slot, recorder),
             Event::Deadline(which) => self.deadline(slot, usize::from(which), recorder),
             Event::Held(which) => self.release(slot, usize::from(which), recorder),
+            Event::Turn(number) => self.turn(number.into(), recorder),
+            Event::Step(number) => self.step_crystals(number.into()),
         }
         true
     }
@@ -281,24 +312,43 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     fn act<R: Recorder>(&mut self, act: usize, recorder: &mut R) {
         let (slot, act) = self.acts[act];
         match act {
-            Act::PowerOn if !self.slots[slot].powered => {
-                self.slots[slot].powered = true;
-                self.tell(slot, &Observation::Power { on: true }, recorder);
-                self.step(slot, self.local(slot), Input::PowerOn, recorder);
-            }
-            Act::PowerOn => {}
-            Act::PowerOff => {
-                self.tell(slot, &Observation::Power { on: false }, recorder);
-                let (index, slot) = (slot, &mut self.slots[slot]);
-                slot.powered = false;
-                slot.cycle_at = None;
-                for deadline in &mut slot.deadlines {
-                    deadline.due = None;
-                }
-                self.bus.silence(index, self.now);
-            }
-            Act::Command(command) => self.step(slot, self.local(slot), Input::Command(command), recorder),
+            Act::PowerOn => self.switch(slot, true, recorder),
+            Act::PowerOff => self.switch(slot, false, recorder),
+            Act::Command(command) => self.command(slot, command, recorder),
         }
+    }
+    fn command<R: Recorder>(&mut self, slot: usize, command: S::Command, recorder: &mut R) {
+        if self.slots[slot].powered {
+            self.step(slot, self.local(slot), Input::Command(command), recorder);
+        } else {
+            self.tell(slot, &Observation::OrderLost, recorder);
+        }
+    }
+    fn switch<R: Recorder>(&mut self, slot: usize, on: bool, recorder: &mut R) {
+        self.slots[slot].switched_on = on;
+        self.supply(slot, recorder);
+    }
+    /// Brings a station's supply to what its switch and the disturbances make of it.
+    fn supply<R: Recorder>(&mut self, index: usize, recorder: &mut R) {
+        let slot = &mut self.slots[index];
+        let on = slot.switched_on && slot.outages == 0;
+        if on == slot.powered {
+            return;
+        }
+        slot.powered = on;
+        if on {
+            self.tell(index, &Observation::Power { on }, recorder);
+            return self.step(index, self.local(index), Input::PowerOn, recorder);
+        }
+        slot.cycle_at = None;
+        for deadline in &mut slot.deadlines {
+            deadline.due = None;
+        }
+        if slot.untuned {
+            self.tune(index);
+        }
+        self.bus.silence(index, self.now);
+        self.tell(index, &Observation::Power { on }, recorder);
     }
     /// Tells what happened to a station and was not its own doing.
     fn tell<R: Recorder>(&self, slot: usize, what: &Observation, recorder: &mut R) {
@@ -314,7 +364,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let sample = if station.sample_with_telegrams { self.raw(slot) } else { 0 };
         let now = self.local(slot);
         // Without octets it was cut off before it began.
-        if station.powered && !self.bus.flight(id).frame.is_empty() {
+        if station.powered && !self.bus.flight(id).frame.is_empty() && !self.is_deaf(slot) {
             self.out.clear();
             let flight = self.bus.flight(id);
             let octets = if flight.broken { &[] } else { flight.frame.octets() };
@@ -326,6 +376,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             self.bus.heard(id);
         }
     }
+    /// Whether a disturbance keeps a station from hearing.
+    fn is_deaf(&self, slot: usize) -> bool {
+        self.faults.deafens(self.slots[slot].address, (self.now, self.clocks_begun(false)))
+    }
     /// The shaft's raw position now (steps); zero without a shaft.
     fn raw(&self, slot: usize) -> u32 {
         self.slots[slot].site.shaft.as_ref().map_or(0, |(shaft, resolution)| resolution.raw(shaft.angle(self.now)))
@@ -336,11 +390,17 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         if self.slots[slot].cycle_at.take_if(|at| *at == self.now).is_none() {
             return; // It lost its supply before.
         }
+        if self.slots[slot].untuned {
+            self.tune(slot);
+        }
         if slot != Self::CLOCK {
             return self.step(slot, self.local(slot), Input::Sent, recorder);
         }
         let cycle = self.clocks;
         self.clocks += 1;
+        if cycle >= self.next_turn {
+            self.turn_in_cycle(cycle, recorder);
+        }
         while let Some(&(_, act)) = self.cycle_acts.get(self.next_cycle_act).filter(|&&(due, _)| due <= cycle) {
             self.next_cycle_act += 1;
             self.act(act, recorder);
@@ -362,10 +422,15 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         deadline.due = None;
         let input = match Timer::ALL.get(which) {
-            Some(&timer) => Input::Deadline { timer, busy: timer == Timer::Slot && self.bus.is_busy(now, slot) },
+            Some(&timer) => Input::Deadline { timer, busy: timer == Timer::Slot && self.is_busy(slot) },
             None => Input::Sample(self.raw(slot)),
         };
         self.step(slot, local, input, recorder);
+    }
+
+    /// Whether a station sees characters on the line.
+    fn is_busy(&self, slot: usize) -> bool {
+        self.bus.is_busy(self.now, slot) && !self.is_deaf(slot)
     }
 
     fn step<R: Recorder>(&mut self, slot: usize, now: Local, input: Input<'_, S::Command>, recorder: &mut R) {
@@ -429,7 +494,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Puts the telegram in the outbox, if there is one, onto the line.
     fn transmit<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
         let Some((send, frame)) = self.out.sending() else { return };
-        let Slot { site, .. } = &self.slots[slot];
+        let &Slot { ref site, address, .. } = &self.slots[slot];
         let mut start = site.crystal.to_true(send.at);
         let mut end = site.crystal.to_true(send.at + self.rate.octets(frame.len()));
         if send.clock {
@@ -443,6 +508,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         if !self.faults.line.is_idle() {
             return self.transmit_disturbed(slot, (start, end), send.clock, recorder);
+        }
+        if self.faults.mutes(address, (start, self.clocks_begun(send.clock))) {
+            return;
         }
         let Some((_, frame)) = self.out.sending() else { return };
         let flight = self.bus.send(slot, (start, end), frame, (Origin::Sender, false));

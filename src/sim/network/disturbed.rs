@@ -56,6 +56,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let Some((_, frame)) = self.out.sending() else { return };
         let sent = Sent { sender: self.slots[slot].address, clock, octets: frame.octets() };
         self.faults.line.judge((start, cycle), &sent);
+        if self.faults.mutes(sent.sender, (start, cycle)) {
+            return;
+        }
         let (mut lost, mut late) = (false, Span::ZERO);
         for index in 0..self.faults.line.strikes().len() {
             let strike = self.faults.line.strikes()[index];
@@ -90,12 +93,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
         }
     }
-    /// A telegram that waited leaves now. A station without supply sends nothing.
+    /// A telegram that waited leaves now. A station without supply sends nothing, nor does one that is kept from it.
     pub(super) fn release<R: Recorder>(&mut self, slot: usize, place: usize, recorder: &mut R) {
         self.held.free.push(place as u16);
-        let Self { held, bus, slots, now, .. } = self;
+        let running = (self.now, self.clocks_begun(false));
+        let Self { held, bus, slots, now, faults, .. } = self;
         let Waiting { frame, broken, origin, length } = &held.telegrams[place];
-        if *origin == Origin::Sender && !slots[slot].powered {
+        let sends = slots[slot].powered && !faults.mutes(slots[slot].address, running);
+        if *origin == Origin::Sender && !sends {
             return;
         }
         let flight = bus.send(slot, (*now, *now + *length), frame, (*origin, *broken));

@@ -3,6 +3,7 @@
 
 use super::class1;
 use super::class2;
+use super::disturbance;
 use super::error::{Fault, Problem};
 use super::expect;
 use super::gsd;
@@ -61,12 +62,19 @@ static STAGES: &[Stage] = &[
     Stage::own(&[sample_lengths, destinations, told_lengths]),
     Stage::own(&[gsd::set_prm_length]),
     Stage::own(&[event_stations, class1::event_stations, gsd::acyclic_devices, event_instants]),
-    Stage::own(&[disturbance_stations, services::commands, expect::subjects]),
+    Stage::own(&[
+        disturbance_stations,
+        disturbance::station::are_there,
+        disturbance::application::are_slaves,
+        disturbance::clock::are_crystals,
+        services::commands,
+        expect::subjects,
+    ]),
     Stage { own: &[], planned: &[rules::START_UP] },
 ];
 
 /// Largest offset of a crystal. Model: twice what cheap ones have over temperature and age.
-const CRYSTAL_MAX_PPB: i64 = 200_000;
+pub(super) const CRYSTAL_MAX_PPB: i64 = 200_000;
 
 /// Checks `scenario` stage by stage until one complains, the planner's rules only with [`Check::All`].
 pub(super) fn check(scenario: &Scenario, reader: &mut Reader<'_>, check: Check) -> Vec<Problem> {
@@ -492,7 +500,7 @@ fn event_instants(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
-        let What::Line(LineFault { which: Which { from, to, .. }, .. }) = &disturbance.what;
+        let What::Line(LineFault { which: Which { from, to, .. }, .. }) = &disturbance.what else { continue };
         for (key, station) in [("from", from), ("to", to)] {
             if let Some(address) = *station
                 && address != facts.scenario.master.address

@@ -1,8 +1,11 @@
 //! Disturbances: the tables `[[disturbance]]`, each with a kind, a name and a window. A new kind is a line of the
 //! registry and a row beside the kinds of its family.
 
+pub(super) mod application;
+pub(super) mod clock;
 mod line;
 mod manner;
+pub(super) mod station;
 pub mod which;
 
 use super::error::Fault;
@@ -48,6 +51,17 @@ pub const DISTURBANCES: &[DisturbanceKind] = &[
     line::DUPLICATE_TELEGRAMS,
     line::BIT_ERRORS,
     line::WRONG_OCTET,
+    station::SILENT,
+    station::MUTE,
+    station::DEAF,
+    station::RESTART,
+    clock::CRYSTAL_OFFSET,
+    clock::CRYSTAL_WANDER,
+    clock::TEMPERATURE_STEP,
+    application::HOLD_LIFE_SIGN,
+    application::JUMP_LIFE_SIGN,
+    application::REPEAT_LIFE_SIGN,
+    application::WRONG_PARAMETERS,
 ];
 
 /// The keys of every disturbance.

@@ -213,11 +213,15 @@ fn change_parameter(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Optio
 }
 #[expect(clippy::unnecessary_wraps, reason = "the signature of all kinds")]
 fn startup(telegram: StartupTelegram, section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Action> {
+    Some(Action::Startup { telegram, patch: patch(section, reader) })
+}
+/// What is changed in a telegram of the start-up.
+pub(super) fn patch(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Patch {
     let mut patch = section.optional(reader, "octets", octets).unwrap_or_default();
     if let Some(length) = section.optional(reader, "length", number(0..=244u8)) {
         patch.set_length(length);
     }
-    Some(Action::Startup { telegram, patch })
+    patch
 }
 /// Pairs of an octet's number, from 1, and its value.
 fn octets(node: &Node) -> Result<Patch, Fault> {

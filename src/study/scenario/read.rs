@@ -10,7 +10,7 @@ use super::gsd;
 use super::kinds::{self, ACTIONS, Kind, address};
 use super::link::link;
 use super::options;
-use super::section::{Reader, Section, cycle_time, instant, number, quantity, suggestion, text, yes};
+use super::section::{Around, Reader, Section, cycle_time, instant, number, quantity, suggestion, text, yes};
 use super::services;
 use super::topology::{self, cable, spread, station_segment};
 use super::tree::{Node, Place, Table, Value};
@@ -87,6 +87,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses, topology.as_ref()));
     let links = list(reader, &root, "link", link);
     let events = list(reader, &root, "event", |section, reader| event(section, reader, &addresses));
+    reader.around = Around { slaves: addresses };
     let disturbances = disturbances(reader, &root);
     let record = record(Section::of_file(reader, &root, "record"), reader);
     let expectations = expect::read(reader, &root, rate);
@@ -207,7 +208,7 @@ fn addresses_of(reader: &mut Reader<'_>, section: &mut Section<'_>) -> Vec<(Addr
 }
 
 /// Addresses, `3`, `"3..5, 9"` or `[3, 4, 9]`, in order and each once.
-fn address_list(node: &Node) -> Result<Vec<Address>, Fault> {
+pub(super) fn address_list(node: &Node) -> Result<Vec<Address>, Fault> {
     let bad = |part: &str| {
         Fault::new(format!("\"{part}\" is no address and no range of addresses"))
             .help("addresses are 0 to 125; a range is written \"3..10\" and includes both ends")
