@@ -79,8 +79,8 @@ enum Command {
     Replay(ReplayArgs),
     /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
-    /// Lists the disturbances that a scenario can name, with their keys and an example of each.
-    Disturbances,
+    /// Lists the disturbances that a scenario can name, with their keys and an example of each, or tells about one.
+    Disturbances(DisturbancesArgs),
     /// Lists the figures that a run can be asked for by name: all families, or the names of one scenario.
     Figures(FiguresArgs),
     /// Shows what a GSD file says, what of it is ignored and what does not fit.
@@ -91,6 +91,13 @@ enum Command {
 #[derive(Args)]
 struct DevicesArgs {
     /// The device to tell about.
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
+}
+
+#[derive(Args)]
+struct DisturbancesArgs {
+    /// The disturbance to tell about.
     #[arg(value_name = "NAME")]
     name: Option<String>,
 }
@@ -194,7 +201,7 @@ fn main() -> ExitCode {
         Command::Budget(args) => budget_command(args).map(done),
         Command::Replay(args) => replay_command(args).map(done),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
-        Command::Disturbances => Ok(done(disturbance::list())),
+        Command::Disturbances(args) => disturbances_command(args.name.as_deref()).map(done),
         Command::Figures(args) => figures_command(args.scenario.as_deref()).map(done),
         Command::Gsd(args) => gsd_command(&args.file),
     };
@@ -274,6 +281,10 @@ fn budget_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
 
 fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
     Ok(name.map_or_else(|| Ok(devices::list()), devices::full)?)
+}
+
+fn disturbances_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
+    Ok(name.map_or_else(|| Ok(disturbance::list()), disturbance::full)?)
 }
 
 fn figures_command(file: Option<&Path>) -> Result<String, Box<dyn std::error::Error>> {

@@ -4,14 +4,17 @@
 //! reaches into a machine. What it draws belongs to its name, so that one more leaves the others' draws as they are.
 
 pub mod clock;
+pub mod damage;
 pub mod line;
+pub mod manner;
 pub mod order;
 pub mod station;
 pub mod turn;
+pub mod which;
 pub mod window;
 
 use crate::sim::fault::clock::{CrystalFault, Pull};
-use crate::sim::fault::line::{LineFault, OnLine};
+use crate::sim::fault::line::{Line, LineFault};
 use crate::sim::fault::order::OrderFault;
 use crate::sim::fault::station::{Apart, StationFault};
 use crate::sim::fault::turn::Turns;
@@ -67,19 +70,20 @@ pub(super) struct Turning {
 /// All disturbances of a network at work.
 #[derive(Clone, Debug, Default)]
 pub struct Faults {
-    line: Vec<OnLine>,
+    /// Those of the line.
+    pub line: Line,
     apart: Vec<Apart>,
     turning: Vec<Turning>,
 }
 
 impl Faults {
-    /// The disturbances of a run with `seed`, in the order of the scenario.
-    pub fn new(disturbances: &[Disturbance], seed: u64) -> Self {
+    /// The disturbances of a run with `seed` among `stations`, in the order of the scenario.
+    pub fn new(disturbances: &[Disturbance], seed: u64, stations: &[Address]) -> Self {
         let mut faults = Self::default();
         for (number, Disturbance { name, window, what }) in disturbances.iter().enumerate() {
             let number = number as u16;
             match what {
-                What::Line(fault) => faults.line.push(OnLine { number, window: *window, fault: *fault }),
+                What::Line(fault) => faults.line.add((number, name, *window), *fault, (seed, stations)),
                 What::Station(stations, fault) => faults.apart.push(Apart::new(stations, *window, *fault)),
                 What::Crystal(..) | What::Order(..) => {}
             }
@@ -99,14 +103,6 @@ impl Faults {
     pub(super) fn take_turning(&mut self) -> Vec<Turning> {
         std::mem::take(&mut self.turning)
     }
-
-    /// Number of the disturbance that loses this telegram, if one does. `clock` marks SYNCH; `cycle` is the running
-    /// cycle, for SYNCH the one it begins.
-    pub fn loses(&self, (now, cycle): (Time, u64), sender: Address, clock: bool, octets: &[u8]) -> Option<u16> {
-        let lost = |line: &&OnLine| line.window.contains(now, cycle) && line.fault.loses(sender, clock, octets);
-        self.line.iter().find(lost).map(|line| line.number)
-    }
-
     /// Whether nothing that `station` sends now, in the cycle of this number, reaches the line.
     pub fn mutes(&self, station: Address, running: (Time, u64)) -> bool {
         self.apart.iter().any(|apart| apart.mutes(station, running))

@@ -12,4 +12,5 @@ pub mod network;
 pub mod noise;
 pub mod queue;
 pub mod record;
+pub mod share;
 pub mod topology;

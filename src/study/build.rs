@@ -188,12 +188,7 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
-    let mut network = Network::new(
-        scenario.bus.params.rate,
-        (wiring(scenario), sites),
-        jitter,
-        Faults::new(&scenario.disturbances, seed),
-    );
+    let mut network = Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, faults(scenario));
     order(&mut network, scenario, &scenario.events);
     for (number, disturbance) in scenario.disturbances.iter().enumerate() {
         if let What::Order(slaves, fault) = &disturbance.what {
@@ -202,6 +197,12 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
         }
     }
     network
+}
+
+/// The disturbances of a scenario at work, with the draws of its seed for each of its stations.
+pub fn faults(scenario: &Scenario) -> Faults {
+    let stations: Vec<_> = scenario.stations().map(|station| station.address).collect();
+    Faults::new(&scenario.disturbances, scenario.run.seed, &stations)
 }
 
 /// Gives `network` the orders of `events`, which are events of `scenario`.

@@ -1,6 +1,7 @@
 //! Tests: what good files become, and what each mistake in a file is answered with.
 
 use super::*;
+use crate::sim::fault::manner::Manner;
 use crate::sim::motion::Angle;
 use crate::study::scenario::disturbance::DISTURBANCES;
 use crate::time::BitRate;
@@ -920,7 +921,8 @@ fn a_good_file_becomes_a_scenario() {
     let action = Action::HoldLifeSign { cycles: Some(2) };
     assert_eq!(scenario.events, [Event { when: When::Time(Span::from_s(1)), slaves: vec![publisher], action }]);
     let window = Window::Cycles(Bursts { from: 1_000, length: Some(1), every: Some(100), times: None });
-    let what = What::Line(LineFault::MissingClocks);
+    let which = Which::all(Service::Only(crate::sim::fault::which::Kind::Synch));
+    let what = What::Line(LineFault { which, manner: Manner::All, effect: Effect::Lost });
     assert_eq!(scenario.disturbances, [Disturbance { name: "missing-clocks".to_owned(), window, what }]);
     assert_eq!(scenario.record.tables, [CsvTable::Cycles, CsvTable::Slaves, CsvTable::Events]);
     assert!(scenario.publishes(publisher) && !scenario.publishes(subscriber));

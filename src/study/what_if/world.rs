@@ -12,7 +12,6 @@
 //! ```
 
 use crate::device::node::Node;
-use crate::sim::fault::Faults;
 use crate::sim::motion::Shaft;
 use crate::sim::network::{Network, NetworkEvent};
 use crate::sim::queue::Queue;
@@ -77,7 +76,7 @@ pub(super) fn change_line<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>
         network.change_jitter(altered.master.gc_jitter).expect("a checked jitter");
     }
     if altered.disturbances != original.disturbances {
-        network.set_faults(Faults::new(&altered.disturbances, altered.run.seed));
+        network.set_faults(build::faults(altered));
     }
 }
 
