@@ -9,13 +9,15 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isodp::sim::network::NetworkEvent;
 use isodp::sim::queue::NearQueue;
+use isodp::study::budget::Budget;
 use isodp::study::gsd::Gsd;
 use isodp::study::plan::command::{Call, answer};
 use isodp::study::plan::rules::warnings;
 use isodp::study::replay::{Window, replay};
-use isodp::study::run::{Outcome, Progress, run};
+use isodp::study::run::{Outcome, Progress, layout, run};
 use isodp::study::scenario::{Extent, Scenario, disturbance};
-use isodp::study::{devices, report};
+use isodp::study::what_if::command as what_if;
+use isodp::study::{devices, figure, report};
 use isodp::time::Span;
 
 /// A planned network breaks a rule, or a GSD file is inconsistent.
@@ -33,10 +35,14 @@ Examples:
       What its bus cycle will be and whether its times keep the rules; --propose shows times that do.
   isodp replay scenarios/reference.toml --cycle 200 --window 2
       Cycles 198 to 202 of the run once more, every telegram and what stations saw, line by line.
+  isodp replay scenarios/reference.toml --cycle 200 --set slave.5.crystal='60 ppm'
+      What if: from cycle 200 on a second future with this crystal runs beside the original; what differs, and when first.
   isodp devices posital-ocd-dpb1b
       What the profile of this device says; without a name, all devices.
   isodp gsd scenarios/gsd/isodp_posital_06df.gsd
       What a GSD file says; scenarios use it with device = { gsd = FILE }.
+  isodp budget scenarios/gc-jitter.toml
+      What uses up the clock window T_PLL_W of each encoder: jitter, crystals, timer grid, loop.
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
 
@@ -61,6 +67,9 @@ enum Command {
     /// Reckons what a scenario's bus cycle will be, and which rules its times keep, without simulating it.
     #[command(after_help = EXAMPLES)]
     Plan(PlanArgs),
+    /// Shares out the clock window T_PLL_W of each encoder among jitter, crystals and timer grid, by switching them off.
+    #[command(after_help = EXAMPLES)]
+    Budget(RunArgs),
     /// Runs a scenario again and tells a stretch of it, every telegram and every observation, line by line.
     #[command(after_help = EXAMPLES)]
     Replay(ReplayArgs),
@@ -68,6 +77,8 @@ enum Command {
     Devices(DevicesArgs),
     /// Lists the disturbances that a scenario can name, with their keys and an example of each.
     Disturbances,
+    /// Lists the figures that a run can be asked for by name: all families, or the names of one scenario.
+    Figures(FiguresArgs),
     /// Shows what a GSD file says, what of it is ignored and what does not fit.
     #[command(after_help = GSD_CODES)]
     Gsd(GsdArgs),
@@ -78,6 +89,13 @@ struct DevicesArgs {
     /// The device to tell about.
     #[arg(value_name = "NAME")]
     name: Option<String>,
+}
+
+#[derive(Args)]
+struct FiguresArgs {
+    /// Scenario file (TOML) whose names are listed.
+    #[arg(value_name = "FILE")]
+    scenario: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -117,15 +135,19 @@ struct ReplayArgs {
     /// The cycle in the middle.
     #[arg(long, value_name = "C")]
     cycle: u64,
-    /// How many cycles before and after it are told too.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    window: u64,
+    /// How many cycles before and after it are told too; with --set, how many cycles both futures go on.
+    #[arg(long, value_name = "N")]
+    window: Option<u64>,
     /// Seed of all random streams, instead of the scenario's.
     #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
     seed: Option<u64>,
-    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    /// What if: from the cycle on another future runs beside the original, with this value of the scenario, for example
+    /// slave.3.crystal='40 ppm'. May be given several times.
+    #[arg(long = "set", visible_alias = "what-if", value_name = "KEY=VALUE", value_parser = assignment)]
     sets: Vec<(String, String)>,
+    /// Changes a value for the whole run, as --set of isodp run does. May be given several times.
+    #[arg(long = "run-set", value_name = "KEY=VALUE", value_parser = assignment)]
+    run_sets: Vec<(String, String)>,
 }
 
 #[derive(Args)]
@@ -159,9 +181,11 @@ fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(args) => run_command(args).map(done),
         Command::Plan(args) => plan_command(args),
+        Command::Budget(args) => budget_command(args).map(done),
         Command::Replay(args) => replay_command(args).map(done),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
         Command::Disturbances => Ok(done(disturbance::list())),
+        Command::Figures(args) => figures_command(args.scenario.as_deref()).map(done),
         Command::Gsd(args) => gsd_command(&args.file),
     };
     match result.and_then(|(page, code)| show(&page).map(|()| code)) {
@@ -209,13 +233,45 @@ fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error
     Ok((answer.page, code))
 }
 
+fn budget_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
+    let scenario = Scenario::load(&args.scenario, &with_seed(args.sets, args.seed))?;
+    for warning in warnings(&scenario) {
+        let _ = writeln!(anstream::stderr(), "warning: {warning}");
+    }
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    bar.set_prefix(scenario.name.clone());
+    bar.set_style(
+        ProgressStyle::with_template("{prefix} [{bar:30}] {pos} of {len} runs").expect("a template that is right"),
+    );
+    let budget = Budget::of(&scenario, |runs| {
+        bar.set_length(runs as u64);
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    let dir = args.out.join(&scenario.name);
+    let files = budget.write(&scenario, &dir)?;
+    Ok(format!("{}{} in {}\n", budget.page(), files.join(", "), dir.display()))
+}
+
 fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
     Ok(name.map_or_else(|| Ok(devices::list()), devices::full)?)
 }
 
+fn figures_command(file: Option<&Path>) -> Result<String, Box<dyn std::error::Error>> {
+    Ok(match file {
+        Some(file) => figure::page::of(&layout(&Scenario::load(file, &[])?)),
+        None => figure::page::list(),
+    })
+}
+
 fn replay_command(args: ReplayArgs) -> Result<String, Box<dyn std::error::Error>> {
-    let scenario = Scenario::load(&args.scenario, &with_seed(args.sets, args.seed))?;
-    Ok(replay::<NearQueue<NetworkEvent>>(&scenario, Window::around(args.cycle, args.window))?)
+    let ReplayArgs { scenario: file, cycle, window, seed, sets, run_sets } = args;
+    let run_sets = with_seed(run_sets, seed);
+    if !sets.is_empty() {
+        return what_if::answer(&what_if::Call { file, run_sets, sets, cycle, window });
+    }
+    let scenario = Scenario::load(&file, &run_sets)?;
+    Ok(replay::<NearQueue<NetworkEvent>>(&scenario, Window::around(cycle, window.unwrap_or(0)))?)
 }
 
 /// Overrides with that of the seed, where one is given.

@@ -171,7 +171,7 @@ impl Timer {
 }
 
 /// A station's answer to one input. Reused from step to step, so that no step allocates.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Outbox {
     frame: Frame,
     send: Option<Send>,

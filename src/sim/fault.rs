@@ -58,6 +58,7 @@ impl What {
 pub(super) struct Turning {
     /// Number of the disturbance in the scenario, from 0.
     pub number: u16,
+    pub name: String,
     pub turns: Turns,
     pub what: What,
     /// What it makes of each station's crystal, in the order of the stations.
@@ -91,7 +92,13 @@ impl Faults {
                 _ => None,
             };
             let pulls = what.stations().iter().filter_map(pull).collect();
-            faults.turning.push(Turning { number, turns: Turns::new(*window), what: what.clone(), pulls });
+            faults.turning.push(Turning {
+                number,
+                name: name.clone(),
+                turns: Turns::new(*window),
+                what: what.clone(),
+                pulls,
+            });
         }
         faults
     }

@@ -197,6 +197,19 @@ impl Shaft {
         }
     }
 
+    /// The same movement, turned so that the shaft stands at `angle` at `time`.
+    #[must_use]
+    pub fn through(mut self, time: Time, angle: Angle) -> Self {
+        let by = angle.0.wrapping_sub(self.angle(time).0);
+        match &mut self.course {
+            Course::Standstill(at) => *at = at.turned(by),
+            Course::Speed { start, .. } => *start = start.turned(by),
+            Course::Sine { centre, .. } => *centre = centre.turned(by),
+            Course::Table(knots) => knots.iter_mut().for_each(|knot| knot.angle = knot.angle.turned(by)),
+        }
+        self
+    }
+
     /// How fast the shaft turns at `time` [revolutions per second], negative backwards; at a point of a table, the
     /// speed after it.
     pub fn speed(&self, time: Time) -> f64 {

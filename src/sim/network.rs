@@ -21,6 +21,8 @@ use crate::time::{BitRate, Local, Time};
 use crate::wire::Address;
 use turn::Turning;
 
+mod alter;
+
 /// One station and the world around it.
 #[derive(Clone, Debug)]
 pub struct Site<S> {
@@ -109,6 +111,7 @@ enum Event {
     Step(u16),
 }
 
+#[derive(Clone)]
 struct Slot<S> {
     site: Site<S>,
     address: Address,
@@ -118,8 +121,9 @@ struct Slot<S> {
     switched_on: bool,
     /// Disturbances that keep its supply off.
     outages: u16,
-    /// Offset of its crystal with what disturbances add (parts per billion), and whether it waits to be in force.
+    /// Offset of its crystal and what disturbances add (parts per billion), and whether that waits to be in force.
     ppb: i64,
+    pulled: i64,
     untuned: bool,
     /// When its next cycle begins, once that is known.
     cycle_at: Option<Time>,
@@ -129,7 +133,8 @@ struct Slot<S> {
     number: u64,
 }
 
-/// A network in time. `Q` is the event queue; any queue gives the same run.
+/// A network in time. `Q` is the event queue; any queue gives the same run. A clone goes on as the original does.
+#[derive(Clone)]
 pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     rate: BitRate,
     slots: Vec<Slot<S>>,
@@ -144,6 +149,8 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     jitter: JitterSource,
     faults: Faults,
     acts: Vec<(usize, Act<S::Command>)>,
+    /// Which of them do not count any more.
+    cancelled: core::ops::Range<usize>,
     /// Acts bound to cycles, by cycle.
     cycle_acts: Vec<(u64, usize)>,
     next_cycle_act: usize,
@@ -192,6 +199,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 switched_on: false,
                 outages: 0,
                 ppb,
+                pulled: 0,
                 untuned: false,
                 cycle_at: None,
                 sample_with_telegrams: false,
@@ -211,6 +219,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             jitter,
             faults,
             acts: Vec::new(),
+            cancelled: 0..0,
             cycle_acts: Vec::new(),
             next_cycle_act: 0,
             turning: Vec::new(),
@@ -280,6 +289,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.now = key.time();
         let slot = usize::from(self.by_address[usize::from(key.station())].expect("events belong to stations"));
         match event {
+            Event::Act(act) if self.cancelled.contains(&(act as usize)) => {}
             Event::Act(act) => self.act(act as usize, recorder),
             Event::Telegram(id) => self.telegram(slot, id, recorder),
             Event::Broadcast(id, rank) => {

@@ -333,6 +333,16 @@ impl JitterSource {
         Ok(Self { jitter, stream: Stream::new(seed, station, Purpose::GcJitter) })
     }
 
+    /// Strays as `jitter` says from the next clock on. The stream goes on where it is.
+    ///
+    /// # Errors
+    /// Those of [`GcJitter::check`]; nothing is changed then.
+    pub fn change(&mut self, jitter: GcJitter) -> Result<(), JitterError> {
+        jitter.check()?;
+        self.jitter = jitter;
+        Ok(())
+    }
+
     /// How much later than nominal the next clock leaves. Signed.
     pub fn draw(&mut self) -> Span {
         match self.jitter {

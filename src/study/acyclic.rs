@@ -56,6 +56,14 @@ impl ClassCounts {
     pub const fn answered(&self) -> u64 {
         self.ended(AcyclicResult::Positive) + self.ended(AcyclicResult::Negative)
     }
+    /// Shortest response time.
+    pub const fn min(&self) -> Option<Span> {
+        self.min
+    }
+    /// Longest response time.
+    pub const fn max(&self) -> Option<Span> {
+        self.max
+    }
     /// Mean response time, to the tick below.
     pub fn mean(&self) -> Option<Span> {
         let mean = self.sum.checked_div(i128::from(self.answered()))?;

@@ -24,7 +24,7 @@ use crate::sim::noise::{JitterSource, LinkJitter, Purpose, Stream};
 use crate::sim::queue::Queue;
 use crate::sim::topology::Place;
 use crate::study::plan::{self, Plan};
-use crate::study::scenario::{self, Action, Class1, CodeSequence, Scenario, Slave, When};
+use crate::study::scenario::{self, Action, Class1, CodeSequence, Event, Scenario, Slave, When};
 use crate::time::{Local, Span, Time};
 use crate::wire::Address;
 use crate::wire::drive::G1Stw;
@@ -194,7 +194,14 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
         jitter,
         Faults::new(&scenario.disturbances, seed),
     );
-    for event in &scenario.events {
+    order_disturbances(&mut network, scenario);
+    order(&mut network, scenario, &scenario.events);
+    network
+}
+
+/// Gives `network` the orders of `events`, which are events of `scenario`.
+pub fn order<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &Scenario, events: &[Event]) {
+    for event in events {
         let when = match event.when {
             When::Time(span) => network::When::Time(Time::ZERO + span),
             When::Cycle(cycle) => network::When::Cycle(cycle),
@@ -203,13 +210,16 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
             network.order(when, station, act);
         }
     }
+}
+
+/// Tells `network` what the disturbances of `scenario` order of masters.
+pub fn order_disturbances<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &Scenario) {
     for (number, disturbance) in scenario.disturbances.iter().enumerate() {
         if let What::Order(slaves, fault) = &disturbance.what {
             let [begin, end] = order_bursts(scenario, slaves, *fault);
             network.order_bursts(number as u16, &begin, &end);
         }
     }
-    network
 }
 
 /// What a disturbance orders of the masters of these slaves at the beginning and at the end of a burst.
@@ -364,16 +374,19 @@ fn limits_of(scenario: &Scenario, slave: Address) -> AcyclicLimits {
 
 /// A station's crystal: its offset set or drawn, its start always drawn.
 fn crystal(seed: u64, station: Address, crystal: scenario::Crystal) -> Crystal {
-    let ppb = match crystal {
+    let mut stream = Stream::new(seed, station.get(), Purpose::CrystalStart);
+    let start = Local::from_ticks(stream.below(CLOCK_START.ticks() as u64) as i64);
+    Crystal::new(crystal_offset(seed, station, crystal), start).expect("a checked offset")
+}
+/// How far a station's crystal is off (10^-9).
+pub fn crystal_offset(seed: u64, station: Address, crystal: scenario::Crystal) -> i64 {
+    match crystal {
         scenario::Crystal::Offset(ppb) => ppb,
         scenario::Crystal::Within(ppb) => {
             let mut stream = Stream::new(seed, station.get(), Purpose::CrystalOffset);
             stream.uniform(Span::from_ticks(ppb)).ticks()
         }
-    };
-    let mut stream = Stream::new(seed, station.get(), Purpose::CrystalStart);
-    let start = Local::from_ticks(stream.below(CLOCK_START.ticks() as u64) as i64);
-    Crystal::new(ppb, start).expect("a checked offset")
+    }
 }
 
 /// An action as orders to stations.

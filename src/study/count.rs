@@ -62,6 +62,8 @@ pub struct NetworkCounts {
     pub events: u64,
     /// Largest latch skew in counts \[steps\]; none if there was no skew.
     pub skew_counts: Option<f64>,
+    /// When a master's mode changed last; none if none did.
+    pub last_mode: Option<Moment>,
 }
 
 /// T_RR, the time from token to token, of a master in a ring.
@@ -86,6 +88,22 @@ impl Rotation {
     /// The mean; none without rotations.
     pub fn mean(&self) -> Option<Span> {
         (self.count > 0).then(|| Span::from_ticks(self.total.ticks() / self.count as i64))
+    }
+}
+
+/// When something happened.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub struct Moment {
+    /// The true instant.
+    pub at: Time,
+    /// The cycle that had begun last, 0 before the first.
+    pub cycle: u64,
+}
+
+impl Moment {
+    /// `at`, when `cycles` had begun.
+    const fn new(at: Time, cycles: u64) -> Self {
+        Self { at, cycle: cycles.saturating_sub(1) }
     }
 }
 
@@ -120,6 +138,15 @@ pub struct SlaveCounts {
     pub no_answers: u64,
     /// Times that this slave asked for Slave_Diag during data exchange (DH).
     pub diagnoses: u64,
+    /// When the first fault was latched.
+    pub first_fault: Option<Moment>,
+    /// When the last fault was latched.
+    pub last_fault: Option<Moment>,
+    /// When cyclic operation was reached for the first time.
+    pub first_operation: Option<Moment>,
+    /// When the DP state, the start-up phase or the state of the clock recovery changed last; going without supply is a
+    /// change too.
+    pub last_change: Option<Moment>,
     /// The first SYNCH that the clock recovery took, as true instant and number of begun cycles.
     first: Option<(Time, u64)>,
     /// When the present phase was entered.
@@ -154,6 +181,17 @@ impl LinkCounts {
             Observation::Link { to: LinkState::Lost, .. } => self.lost += 1,
             _ => {}
         }
+    }
+}
+
+/// Whether a slave is in another DP state, start-up phase or state of its clock recovery after this.
+fn changes_state(what: &Observation) -> bool {
+    match *what {
+        Observation::SlaveState { from, to, .. } => from != to,
+        Observation::Phase { from, to } => from != to,
+        Observation::Pll { from, to } => from != to,
+        Observation::Power { on: false } => true,
+        _ => false,
     }
 }
 
@@ -227,6 +265,9 @@ impl Counts {
             Observation::Collision { .. } => self.network.collisions += 1,
             Observation::Disturbed { how: Disturbance::Begins | Disturbance::Ends, .. } => {}
             Observation::Disturbed { .. } => self.network.disturbed += 1,
+            Observation::MasterMode { from, to } if from != to => {
+                self.network.last_mode = Some(Moment::new(at, self.network.cycles));
+            }
             _ => {}
         }
         self.acyclic.station(what);
@@ -261,6 +302,10 @@ impl SlaveCounts {
             retries: 0,
             no_answers: 0,
             diagnoses: 0,
+            first_fault: None,
+            last_fault: None,
+            first_operation: None,
+            last_change: None,
             first: None,
             since: Time::ZERO,
         }
@@ -268,9 +313,18 @@ impl SlaveCounts {
 
     /// Counts what this slave observed at `at`, `cycles` after the beginning.
     pub(super) fn observe(&mut self, at: Time, cycles: u64, what: &Observation) {
+        let now = Moment::new(at, cycles);
+        if changes_state(what) {
+            self.last_change = Some(now);
+        }
         match *what {
             Observation::SlaveState { to, .. } => self.state = to,
-            Observation::Phase { to, .. } => self.phase(at, to),
+            Observation::Phase { to, .. } => {
+                self.phase(at, to);
+                if to == Phase::Operation {
+                    self.first_operation.get_or_insert(now);
+                }
+            }
             Observation::Leds { to, .. } => self.leds = to,
             Observation::Power { on: false } => {
                 self.phase(at, Phase::Configuration);
@@ -283,7 +337,11 @@ impl SlaveCounts {
                 self.clock_failures += 1;
             }
             Observation::Pll { to, .. } => self.pll(at, cycles, to),
-            Observation::Fault { code } => *self.faults.entry(code).or_insert(0) += 1,
+            Observation::Fault { code } => {
+                *self.faults.entry(code).or_insert(0) += 1;
+                self.first_fault.get_or_insert(now);
+                self.last_fault = Some(now);
+            }
             Observation::Acknowledged { .. } => self.acknowledgements += 1,
             _ => {}
         }

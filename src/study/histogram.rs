@@ -7,6 +7,7 @@
 
 use super::layout::Layout;
 use super::row::{CycleRow, LinkRow, Sink, SlaveRow};
+use super::statistics::bins::Counted;
 use crate::time::Span;
 use crate::wire::Address;
 
@@ -185,6 +186,25 @@ impl Histogram {
         &self.positive
     }
 
+    /// Everything in bins, ascending: what cannot be told apart is one, and so is what is out of range on either side.
+    pub(in crate::study) fn counted(&self) -> Vec<Counted> {
+        let limit = self.limit as i64;
+        let side = |side: &hdrhistogram::Histogram<u64>, sign: i64| {
+            let bin = |value: u64, count| {
+                let ends = [side.lowest_equivalent(value), side.highest_equivalent(value)].map(|end| sign * end as i64);
+                (ends[0].min(ends[1]), ends[0].max(ends[1]), count)
+            };
+            side.iter_recorded().map(|step| bin(step.value_iterated_to(), step.count_at_value())).collect::<Vec<_>>()
+        };
+        let mut all = self.negative.as_ref().map_or_else(Vec::new, |negative| side(negative, -1));
+        all.push((self.min, if self.is_signed() { -limit - 1 } else { -1 }, self.below));
+        all.extend(side(&self.positive, 1));
+        all.push((limit.saturating_add(1), self.max, self.above));
+        all.retain(|bin| bin.2 > 0);
+        all.sort_unstable();
+        let inside = |ticks: i64| ticks.clamp(self.min, self.max);
+        all.into_iter().map(|(low, high, count)| Counted { low: inside(low), high: inside(high), count }).collect()
+    }
     /// What is in range, ascending, as (middle of what cannot be told apart \[ticks\], count).
     fn recorded(&self) -> Vec<(i64, u64)> {
         let side = |side: &hdrhistogram::Histogram<u64>, sign: i64| {

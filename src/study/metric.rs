@@ -30,7 +30,7 @@ impl<F: Fn(Address, Time) -> f64> Shafts for F {
 }
 
 /// Makes rows of a run and hands them to a sink.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Metrics<S, V> {
     layout: Layout,
     shafts: V,
@@ -52,14 +52,14 @@ pub struct Metrics<S, V> {
 const HELD: usize = 512;
 
 /// The nominal latch instant of all slaves with one T_I.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Grid {
     t_i: Span,
     latch: Time,
 }
 
 /// What is known of one slave.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Watch {
     /// The row of this cycle; what it does not renew is carried over to the next.
     row: SlaveRow,
@@ -77,7 +77,7 @@ struct Watch {
 }
 
 /// What is known of one link in this cycle.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct LinkWatch {
     publisher: usize,
     row: LinkRow,

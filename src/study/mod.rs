@@ -2,10 +2,15 @@
 //! threads and reports.
 
 pub mod acyclic;
+pub mod budget;
 pub mod build;
 pub mod count;
 pub mod devices;
+pub mod difference;
+pub mod episode;
+pub mod event_budget;
 pub mod export;
+pub mod figure;
 pub mod gsd;
 pub mod histogram;
 pub mod layout;
@@ -22,5 +27,8 @@ pub mod run;
 #[cfg(test)]
 mod sample;
 pub mod scenario;
+pub mod statistics;
 pub mod summary;
 pub mod topology;
+pub mod verdict;
+pub mod what_if;

@@ -6,6 +6,7 @@ use super::masters;
 use super::summary::{
     Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, StationSummary, Summary, Timing,
 };
+use super::verdict;
 use crate::observation::Leds;
 use crate::time::Span;
 
@@ -24,12 +25,14 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     masters(summary, &mut lines);
     slaves(summary, &mut lines);
     leds(summary, &mut lines);
+    episodes(summary, &mut lines);
     live_list(summary, &mut lines);
     spread(summary, &mut lines);
     links(summary, &mut lines);
     acyclic(summary, &mut lines);
     fingerprint(summary, &mut lines);
     files(summary, dir, &mut lines);
+    verdicts(summary, &mut lines);
     lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
@@ -158,6 +161,14 @@ fn leds(summary: &Summary, lines: &mut Vec<String>) {
             let LedSummary { red, green, meaning } = leds;
             lines.push(format!("LEDs red {red}, green {green} at slave {}: {meaning}", ranges(&slaves)));
         }
+    }
+}
+
+/// How long disturbances took to harm, and slaves to recover.
+fn episodes(summary: &Summary, lines: &mut Vec<String>) {
+    if let Some(episodes) = &summary.episodes {
+        lines.push(String::new());
+        lines.extend(episodes.lines());
     }
 }
 
@@ -322,6 +333,14 @@ fn files(summary: &Summary, dir: Option<&str>, lines: &mut Vec<String>) {
     }
     if let Some(dir) = dir {
         lines.push(format!("{} in {dir}", number(summary.files.len(), "file")));
+    }
+}
+
+/// What became of the scenario's expectations, last, since it is what one looks for.
+fn verdicts(summary: &Summary, lines: &mut Vec<String>) {
+    if !summary.verdicts.is_empty() {
+        lines.push(String::new());
+        lines.extend(verdict::page::lines(&summary.verdicts));
     }
 }
 

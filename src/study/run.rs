@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::build;
 use super::count::Counts;
+use super::episode::Episodes;
+use super::event_budget::{EventBudget, NoHeadway};
 use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
+use super::figure::Figures;
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, MasterLayout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
@@ -15,6 +18,7 @@ use super::row::Sink;
 use super::scenario::{Extent, Scenario};
 use super::summary::{Facts, SlaveFacts, Summary};
 use super::topology::Map;
+use super::verdict;
 use crate::device::node::Node;
 use crate::observation::MasterClass;
 use crate::sim::fingerprint::{Digest, Fingerprint, Fingerprints};
@@ -24,8 +28,6 @@ use crate::sim::queue::Queue;
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
-/// Events between two looks at the progress.
-const STRIDE: u64 = 50_000;
 /// File of the topology in text.
 const TOPOLOGY: &str = "topology.txt";
 /// Bins of a histogram in a picture.
@@ -51,6 +53,8 @@ pub struct Outcome {
     pub stations: Vec<(Address, Fingerprint)>,
     /// Hash of every figure of the summary.
     pub statistics: u64,
+    /// Everything that was counted and recorded, by name.
+    pub figures: Figures,
     /// Where the files are, if there are any.
     pub dir: Option<PathBuf>,
 }
@@ -61,6 +65,9 @@ pub enum RunError {
     /// A table, log or summary could not be written.
     #[error(transparent)]
     Export(#[from] ExportError),
+    /// It makes no headway.
+    #[error(transparent)]
+    NoHeadway(#[from] NoHeadway),
     /// A picture could not be written.
     #[error(transparent)]
     Plot(#[from] PlotError),
@@ -92,6 +99,7 @@ impl Shafts for Speeds {
 /// Everything that takes rows.
 struct Sinks {
     histograms: Histograms,
+    episodes: Episodes,
     exports: Option<Exports>,
     plots: Option<Plots>,
 }
@@ -103,6 +111,7 @@ impl Sink for Sinks {
     }
     fn slave(&mut self, row: &super::row::SlaveRow) {
         self.histograms.slave(row);
+        self.episodes.slave(row);
         self.exports.slave(row);
         self.plots.slave(row);
     }
@@ -113,6 +122,7 @@ impl Sink for Sinks {
     }
     fn event(&mut self, row: &super::row::EventRow) {
         self.histograms.event(row);
+        self.episodes.event(row);
         self.exports.event(row);
         self.plots.event(row);
     }
@@ -134,7 +144,7 @@ pub const fn until(scenario: &Scenario) -> Until {
 pub fn run<Q: Queue<NetworkEvent>>(
     scenario: &Scenario,
     out: Option<&Path>,
-    mut watch: impl FnMut(Progress),
+    watch: impl FnMut(Progress),
 ) -> Result<Outcome, RunError> {
     let dir = out.filter(|_| scenario.record.files).map(|out| out.join(&scenario.name));
     let layout = layout(scenario);
@@ -144,30 +154,29 @@ pub fn run<Q: Queue<NetworkEvent>>(
     });
     let draws = dir.is_some() && scenario.record.plots;
     let plots = draws.then(|| Plots::new(meta(scenario, &layout)));
-    let sinks = Sinks { histograms: Histograms::new(&layout), exports: exports.transpose()?, plots };
+    let clocked = |slave| scenario.slave(slave).is_some_and(|slave| scenario.is_clocked(slave));
+    let episodes = Episodes::new(&layout, clocked);
+    let sinks = Sinks { histograms: Histograms::new(&layout), episodes, exports: exports.transpose()?, plots };
     let metrics = Metrics::new(layout, Speeds::of(scenario), sinks);
     let bus = draws.then(|| BusCycle::new(scenario.master.address));
 
     let mut network: Network<Node, Q> = build::network(scenario);
     let mut recorder = (Fingerprints::new(scenario.master.address), (metrics, bus));
-    let end = until(scenario);
-    while !network.run(end, STRIDE, &mut recorder) {
-        watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
-    }
-    watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
+    EventBudget::of(scenario).run(&mut network, scenario, &mut recorder, watch)?;
     let (fingerprints, (metrics, bus)) = recorder;
-    let (counts, sinks) = metrics.finish(network.now());
+    let (counts, mut sinks) = metrics.finish(network.now());
+    sinks.episodes.finish(network.now());
 
     let summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
-    conclude(scenario, summary, &counts, sinks, (&fingerprints, bus.as_ref()), dir)
+    conclude(scenario, summary, counts, sinks, (&fingerprints, bus.as_ref()), dir)
 }
 
 /// Adds the fingerprints, the LEDs, what slaves and masters did and the topology, then writes the files.
 fn conclude(
     scenario: &Scenario,
     mut summary: Summary,
-    counts: &Counts,
-    sinks: Sinks,
+    counts: Counts,
+    Sinks { histograms, episodes, exports, plots }: Sinks,
     (fingerprints, bus): (&Fingerprints, Option<&BusCycle>),
     dir: Option<PathBuf>,
 ) -> Result<Outcome, RunError> {
@@ -182,9 +191,12 @@ fn conclude(
         ("statistics", statistics),
     ];
     summary.fingerprint = texts.map(|(name, hash)| (name.to_owned(), format!("{hash:016x}"))).to_vec();
-    summary.show_leds(counts);
-    summary.show_receptions(counts);
-    summary.show_acyclic(counts);
+    summary.show_leds(&counts);
+    summary.show_receptions(&counts);
+    summary.show_acyclic(&counts);
+    summary.show_episodes(&episodes);
+    let figures = Figures::new(counts, histograms, episodes);
+    summary.verdicts = verdict::judge(&scenario.expectations, &figures);
     let map = Map::of(scenario);
     if scenario.topology.has_segments() {
         summary.topology = map.text(false);
@@ -192,18 +204,18 @@ fn conclude(
     summary.warnings = rules::warnings(scenario);
 
     let mut pictures = Vec::new();
-    if let (Some(dir), Some(plots), Some(bus)) = (&dir, &sinks.plots, bus) {
-        pictures = stage(dir, plots.pictures(&distributions(&sinks.histograms), bus)?)?;
+    if let (Some(dir), Some(plots), Some(bus)) = (&dir, &plots, bus) {
+        pictures = stage(dir, plots.pictures(&distributions(figures.histograms()), bus)?)?;
         summary.files.extend(plots.files().map(str::to_owned));
     }
     if let Some(dir) = &dir {
         pictures.extend(stage(dir, vec![(TOPOLOGY, map.text(true).join("\n") + "\n")])?);
         summary.files.push(TOPOLOGY.to_owned());
     }
-    if let Some(exports) = sinks.exports {
-        exports.finish(pictures, &sinks.histograms, &mut summary)?;
+    if let Some(exports) = exports {
+        exports.finish(pictures, figures.histograms(), &mut summary)?;
     }
-    Ok(Outcome { summary, fingerprint, stations: fingerprints.stations().collect(), statistics, dir })
+    Ok(Outcome { summary, fingerprint, stations: fingerprints.stations().collect(), statistics, figures, dir })
 }
 
 /// Writes pictures and texts under temporary names.

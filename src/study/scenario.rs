@@ -11,6 +11,7 @@ mod class1;
 mod class2;
 pub mod disturbance;
 pub mod error;
+mod expect;
 #[cfg(test)]
 mod faults;
 mod gsd;
@@ -40,6 +41,7 @@ pub use crate::sim::fault::window::{Bursts, Window};
 pub use crate::sim::fault::{Disturbance, What};
 use crate::sim::motion::Motion;
 use crate::sim::noise::GcJitter;
+use crate::study::verdict::Expectation;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
 use crate::wire::control::GlobalControl;
@@ -83,6 +85,8 @@ pub struct Scenario {
     pub disturbances: Vec<Disturbance>,
     /// What to keep.
     pub record: Record,
+    /// What is expected of the run's figures, in the order of the file.
+    pub expectations: Vec<Expectation>,
 }
 
 /// Where the text of a scenario comes from.
@@ -284,6 +288,8 @@ pub struct Run {
     pub seed: u64,
     /// Where the run ends.
     pub duration: Extent,
+    /// Events per T_DP beyond which a run makes no headway, at least 1; none is what the bits of a T_DP allow.
+    pub max_events: Option<u64>,
 }
 
 impl Run {
@@ -649,7 +655,7 @@ pub(crate) mod tests {
         Scenario {
             name: "network".into(),
             question: String::new(),
-            run: Run { seed: 1, duration: Extent::Cycles(1_000) },
+            run: Run { seed: 1, duration: Extent::Cycles(1_000), max_events: None },
             bus: Bus { params: BusParams::profile(rate), cable_mm: 0 },
             topology: Topology::line(0),
             master: Master {
@@ -686,6 +692,7 @@ pub(crate) mod tests {
                 tables: CsvTable::ALL.iter().map(|&(_, table)| table).collect(),
                 rows: 20_000,
             },
+            expectations: Vec::new(),
         }
     }
 

@@ -4,11 +4,13 @@ use serde::{Serialize, Serializer};
 
 use super::acyclic::AcyclicSummary;
 use super::count::{Counts, LinkCounts, SlaveCounts};
+use super::episode::{EpisodeSummary, Episodes};
 use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
 use super::live_list::{Seen, Station};
 use super::masters::MasterSummary;
+use super::verdict::Verdict;
 use crate::observation::Leds;
 use crate::time::{BitRate, Span};
 use crate::wire::Address;
@@ -46,9 +48,16 @@ pub struct Summary {
     /// Acyclic services per class of master; none before [`Summary::show_acyclic`].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub acyclic: Vec<AcyclicSummary>,
+    /// From disturbances to faults, and back to full operation; none before [`Summary::show_episodes`] and where no slave
+    /// was harmed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub episodes: Option<EpisodeSummary>,
     /// Name and text of each fingerprint.
     #[serde(serialize_with = "map")]
     pub fingerprint: Vec<(String, String)>,
+    /// What became of the scenario's expectations, in their order; nothing where it expects nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub verdicts: Vec<Verdict>,
     /// What each table of rows kept.
     pub thinning: Vec<Thinning>,
     /// Events that `events.csv` does not hold.
@@ -436,6 +445,7 @@ impl Summary {
             links: layout.links().iter().map(link).collect(),
             live_list: counts.live_list.stations().filter_map(StationSummary::of).collect(),
             acyclic: Vec::new(),
+            episodes: None,
             network: Network {
                 scenario: facts.scenario,
                 bit_rate: facts.bit_rate.text(),
@@ -449,6 +459,7 @@ impl Summary {
             fingerprint: facts.fingerprint,
             topology: Vec::new(),
             warnings: Vec::new(),
+            verdicts: Vec::new(),
             thinning: Vec::new(),
             events_left_out: 0,
             files: Vec::new(),
@@ -474,6 +485,16 @@ impl Summary {
     /// stays comparable with that of runs before they were counted.
     pub fn show_acyclic(&mut self, counts: &Counts) {
         self.acyclic = AcyclicSummary::all(&counts.acyclic);
+    }
+
+    /// Whether every expectation of the scenario holds.
+    pub fn passed(&self) -> bool {
+        self.verdicts.iter().all(|verdict| verdict.passed)
+    }
+    /// Adds the episodes. What they are made of is in the fingerprint of the states; the hash of all figures stays
+    /// comparable with that of runs before they were told.
+    pub fn show_episodes(&mut self, episodes: &Episodes) {
+        self.episodes = EpisodeSummary::of(episodes);
     }
 
     /// A distribution of the network by the name of its quantity.

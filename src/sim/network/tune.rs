@@ -11,6 +11,7 @@ use crate::sim::fault::clock::{Pull, within};
 use crate::time::Span;
 
 /// What a disturbance makes of the crystals of its stations.
+#[derive(Clone)]
 pub(super) struct Tuning {
     /// For each station, in the order of the disturbance's slots.
     pub pulls: Vec<Pull>,
@@ -54,20 +55,24 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             change(pull);
             let change = pull.ppb() - before;
             if change != 0 {
-                self.slots[slot].ppb += change;
+                self.slots[slot].pulled += change;
                 self.tune(slot);
             }
         }
     }
-    /// Gives a station's crystal the rate that it has now.
+    /// Gives a station's crystal the rate that disturbances make of it, once no cycle start waits.
     #[cold]
     pub(super) fn tune(&mut self, index: usize) {
         let slot = &mut self.slots[index];
         slot.untuned = slot.cycle_at.is_some();
-        if slot.untuned {
-            return;
+        if !slot.untuned {
+            self.set_rate(index);
         }
-        slot.site.crystal.set_rate(self.now, within(slot.ppb)).expect("a rate within bounds");
+    }
+    /// Puts the rate of a station's crystal in force: what the station waits for comes when the crystal shows it.
+    pub(super) fn set_rate(&mut self, index: usize) {
+        let slot = &mut self.slots[index];
+        slot.site.crystal.set_rate(self.now, within(slot.ppb + slot.pulled)).expect("a rate within bounds");
         for which in 0..Outbox::DEADLINES {
             if let Some((local, _)) = self.slots[index].deadlines[which].due {
                 Self::arm(&mut self.queue, &mut self.slots[index], which, local, self.now);

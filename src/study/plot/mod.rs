@@ -10,6 +10,7 @@ use crate::time::Span;
 use crate::wire::Address;
 
 mod buckets;
+pub mod budget;
 mod bus_cycle;
 mod chart;
 mod distribution;

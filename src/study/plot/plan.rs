@@ -71,7 +71,8 @@ fn free_running(scenario: &Scenario, planned: &Plan) -> String {
     )
 }
 
-fn meta(scenario: &Scenario) -> PlotMeta {
+/// What a picture says about a scenario that is no run's.
+pub(super) fn meta(scenario: &Scenario) -> PlotMeta {
     let t_dp = scenario.master.t_dp;
     PlotMeta {
         scenario: scenario.name.clone(),

@@ -5,6 +5,7 @@ use super::class1;
 use super::class2;
 use super::disturbance;
 use super::error::{Fault, Problem};
+use super::expect;
 use super::gsd;
 use super::section::Reader;
 use super::services;
@@ -67,6 +68,7 @@ static STAGES: &[Stage] = &[
         disturbance::application::are_slaves,
         disturbance::clock::are_crystals,
         services::commands,
+        expect::subjects,
     ]),
     Stage { own: &[], planned: &[rules::START_UP] },
 ];

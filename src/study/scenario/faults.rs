@@ -906,7 +906,7 @@ fn a_subscriber_has_at_most_29_links() {
 fn a_good_file_becomes_a_scenario() {
     let scenario = good(&[]);
     assert_eq!(scenario.question, "Does a clock lost every 100 cycles trip 0F04?\nExpected: no. Source: Model: D15.");
-    assert_eq!(scenario.run, Run { seed: 7, duration: Extent::Time(Span::from_s(20)) });
+    assert_eq!(scenario.run, Run { seed: 7, duration: Extent::Time(Span::from_s(20)), max_events: None });
     assert_eq!(scenario.bus, Bus { params: BusParams::profile(BitRate::M12), cable_mm: 100_000 });
     assert_eq!(scenario.master.t_dp, Span::from_ms(4));
     let (sigma, bound) = (Span::from_ns(100), Span::from_ns(400));

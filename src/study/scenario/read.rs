@@ -5,6 +5,7 @@ use super::class1;
 use super::class2;
 use super::disturbance;
 use super::error::Fault;
+use super::expect;
 use super::gsd;
 use super::kinds::{self, ACTIONS, Kind, address};
 use super::link::link;
@@ -28,11 +29,12 @@ use crate::time::{BitRate, Span, Tbit};
 use crate::wire::Address;
 
 /// The tables of a file; the second half is lists, `[[slave]]`.
-const TABLES: [&str; 12] = [
+const TABLES: [&str; 13] = [
     "run",
     "bus",
     "master",
     "record",
+    expect::EXPECT,
     "segment",
     "repeater",
     "slave",
@@ -43,7 +45,7 @@ const TABLES: [&str; 12] = [
     "disturbance",
 ];
 /// How many of [`TABLES`] are single tables.
-const SINGLE: usize = 4;
+const SINGLE: usize = 5;
 
 /// A slave's table after its list of addresses has been written out: one per slave.
 struct SlaveTable {
@@ -88,6 +90,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
     reader.around = Around { slaves: addresses };
     let disturbances = disturbances(reader, &root);
     let record = record(Section::of_file(reader, &root, "record"), reader);
+    let expectations = expect::read(reader, &root, rate);
     let mut scenario = Scenario {
         name: String::new(),
         question: String::new(),
@@ -102,6 +105,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         events,
         disturbances,
         record,
+        expectations,
     };
     if scenario.master.pace != Pace::Synch {
         scenario.master.t_dp = Plan::of(&scenario).free_running(&scenario).with_gap();
@@ -244,6 +248,10 @@ fn overrides(reader: &mut Reader<'_>, root: &mut Table, slaves: &mut [SlaveTable
                     Err(fault.help(format!("the slaves are {}", all.join(", "))))
                 }
             }
+            [expect::EXPECT, ref rest @ ..] if !rest.is_empty() => {
+                expect::put(root, &rest.join("."), &set.node);
+                Ok(())
+            }
             [name, index, ref rest @ ..] if TABLES[SINGLE..].contains(&name) => match entry(root, name, index) {
                 Some(table) => put(table, rest, &set.node),
                 None => Err(Fault::new(format!("there is no [[{name}]] number \"{index}\"")).help("the first is 1")),
@@ -332,9 +340,10 @@ fn run(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<Run> {
         let fault = Fault::new("a run has either duration or cycles");
         section.complain(reader, fault.help("for example: duration = \"20 s\", or cycles = 10000"));
     }
+    let max_events = section.optional(reader, "max_events", number(1..=u64::MAX));
     section.finish(reader);
     let duration = time.map(Extent::Time).or(cycles.map(Extent::Cycles))?;
-    Some(Run { seed, duration })
+    Some(Run { seed, duration, max_events })
 }
 
 /// Reads `[bus]`.

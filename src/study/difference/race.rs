@@ -1,0 +1,173 @@
+//! Race: two networks in lockstep, compared station by station.
+//!
+//! Both run to the same instant, then what they did is laid side by side: the first happening of a station in one run
+//! belongs to its first in the other. A happening without counterpart waits until the other run has passed its instant;
+//! then it is something that only one of them did.
+
+use super::tape::{Strand, Tape};
+use super::{Difference, Differences};
+use crate::device::node::Node;
+use crate::sim::network::{Network, NetworkEvent, Until};
+use crate::sim::queue::Queue;
+use crate::sim::record::Recorder;
+use crate::study::build;
+use crate::study::run::until;
+use crate::study::scenario::Scenario;
+use crate::time::{Span, Time};
+use crate::wire::Address;
+
+/// Where a run ends: at whichever comes first.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(in crate::study) struct End {
+    /// The cycle whose beginning ends it.
+    pub(in crate::study) cycle: Option<u64>,
+    /// The instant at which it ends.
+    pub(in crate::study) at: Option<Time>,
+}
+
+impl End {
+    /// Where a run of `scenario` ends.
+    pub(in crate::study) const fn of(scenario: &Scenario) -> Self {
+        match until(scenario) {
+            Until::Time(at) => Self { cycle: None, at: Some(at) },
+            Until::Cycle(cycle) => Self { cycle: Some(cycle), at: None },
+        }
+    }
+    /// The same, or when `cycle` begins.
+    pub(in crate::study) fn or_cycle(self, cycle: u64) -> Self {
+        Self { cycle: Some(self.cycle.map_or(cycle, |own| own.min(cycle))), ..self }
+    }
+}
+
+/// One network with all that is needed to go on with it.
+pub(in crate::study) struct Runner<Q, R> {
+    /// It.
+    pub(in crate::study) network: Network<Node, Q>,
+    /// The master whose cycles count.
+    pub(in crate::study) master: Address,
+    /// The cycle that it is in; none before the first.
+    pub(in crate::study) cycle: Option<u64>,
+    /// Where it ends.
+    pub(in crate::study) end: End,
+    /// Who rides along.
+    pub(in crate::study) rider: R,
+}
+
+/// A runner with the tape of its deeds.
+struct Side<Q, R> {
+    network: Network<Node, Q>,
+    end: End,
+    recorder: (Tape, R),
+    over: bool,
+}
+
+impl<Q: Queue<NetworkEvent>, R: Recorder> Side<Q, R> {
+    fn new(runner: Runner<Q, R>) -> Self {
+        let Runner { network, master, cycle, end, rider } = runner;
+        Self { network, end, recorder: (Tape::new(master, cycle, end.cycle), rider), over: false }
+    }
+    /// Runs to `to`, or to the end if that is earlier. Tells how far it came.
+    fn advance(&mut self, to: Time) -> Time {
+        let to = self.end.at.map_or(to, |end| end.min(to));
+        while !self.over {
+            self.over = self.end.cycle.is_some_and(|last| self.network.cycles() > last);
+            if self.over || self.network.run(Until::Time(to), 1, &mut self.recorder) {
+                break;
+            }
+        }
+        self.over |= self.end.at == Some(to);
+        self.recorder.0.ended().unwrap_or(to)
+    }
+}
+
+/// Two networks side by side. `R` rides along on each.
+pub struct Race<Q, R = ()> {
+    sides: [Side<Q, R>; 2],
+    /// How far both go between two looks.
+    stride: Span,
+    /// For each station, what was found first in each strand.
+    found: Vec<[Option<Difference>; 2]>,
+}
+
+impl<Q: Queue<NetworkEvent>, R: Recorder> Race<Q, R> {
+    /// `before` and `now` from their starts, with their riders.
+    ///
+    /// # Panics
+    /// If a scenario breaks a rule that reading it checks.
+    pub fn new(before: &Scenario, now: &Scenario, [rider, other]: [R; 2]) -> Self {
+        let runner = |scenario: &Scenario, rider| Runner {
+            network: build::network(scenario),
+            master: scenario.master.address,
+            cycle: None,
+            end: End::of(scenario),
+            rider,
+        };
+        Self::of([runner(before, rider), runner(now, other)], before.master.t_dp)
+    }
+    /// Networks that are under way at the same instant, compared every `stride`.
+    pub(in crate::study) fn of(runners: [Runner<Q, R>; 2], stride: Span) -> Self {
+        let sides = runners.map(Side::new);
+        Self { sides, stride: stride.max(Span::from_us(100)), found: vec![[None, None]; Tape::STATIONS] }
+    }
+
+    /// Both to `to`, as far as they go.
+    pub(in crate::study) fn advance(&mut self, to: Time) {
+        let [before, now] = &mut self.sides;
+        let passed = before.advance(to).min(now.advance(to));
+        self.compare(passed);
+    }
+    /// From here on `cycle` is under way in both. Gives the second network, to be changed.
+    pub(in crate::study) fn begin(&mut self, cycle: u64) -> &mut Network<Node, Q> {
+        for side in &mut self.sides {
+            side.recorder.0.begin(cycle);
+        }
+        &mut self.sides[1].network
+    }
+    /// Both to their ends. Gives what is different, and for each network its end and its rider.
+    pub fn run(mut self) -> (Differences, [(Time, R); 2]) {
+        let mut to = self.sides[0].network.now().max(self.sides[1].network.now());
+        while self.sides.iter().any(|side| !side.over) {
+            to += self.stride;
+            self.advance(to);
+        }
+        let differences = Differences::new(&self.found);
+        (differences, self.sides.map(|side| (side.network.now(), side.recorder.1)))
+    }
+
+    /// Lays side by side what both have done until `passed`.
+    fn compare(&mut self, passed: Time) {
+        let [before, now] = &mut self.sides;
+        let (before, now) = (&mut before.recorder.0, &mut now.recorder.0);
+        for (station, found) in self.found.iter_mut().enumerate() {
+            let Some(address) = Address::new(station as u8) else { continue };
+            for strand in Strand::ALL {
+                let found = &mut found[strand as usize];
+                if found.is_none() {
+                    *found = first([before, now], address, strand, passed);
+                }
+                if found.is_some() {
+                    before.finish(station, strand);
+                    now.finish(station, strand);
+                }
+            }
+        }
+    }
+}
+
+/// The first difference of a station in what both tapes have, which are complete until `passed`.
+fn first([before, now]: [&mut Tape; 2], address: Address, strand: Strand, passed: Time) -> Option<Difference> {
+    let station = usize::from(address.get());
+    loop {
+        let different = match (before.first(station, strand), now.first(station, strand)) {
+            (None, None) => return None,
+            (Some(one), Some(other)) if one.agrees_with(other) => false,
+            (Some(_), Some(_)) => true,
+            (Some(alone), None) | (None, Some(alone)) if alone.at <= passed => true,
+            _ => return None,
+        };
+        let (before, now) = (before.pop(station, strand), now.pop(station, strand));
+        if different {
+            return Some(Difference { station: address, before, now });
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Fork: a run brought to the point where a cycle begins, so that it can go on in two ways.
+//!
+//! A cycle begins with its SYNCH. The master gives it to the line as soon as its other work is done, long before the
+//! first bit, and there it is decided whether this SYNCH strays or is lost. So the fork lies just before that; without
+//! SYNCH, just before the cycle begins.
+
+use crate::device::node::Node;
+use crate::observation::{Disturbance, Observation};
+use crate::sim::network::{Network, NetworkEvent, Until};
+use crate::sim::queue::Queue;
+use crate::sim::record::{Recorder, Stamp, Transmission};
+use crate::study::build;
+use crate::study::difference::{End, is_synch};
+use crate::study::replay::ReplayError;
+use crate::study::scenario::Scenario;
+use crate::time::Time;
+use crate::wire::Address;
+
+/// Looks for the master's last deed before a cycle.
+struct Scout {
+    master: Address,
+    /// The SYNCH that was just sent: its first bit, none if it was taken away.
+    sent: Option<Option<Time>>,
+    /// When the cycle began.
+    begun: Option<Time>,
+}
+
+impl Recorder for Scout {
+    fn telegram(&mut self, telegram: &Transmission<'_>) {
+        if telegram.sender == self.master && is_synch(telegram.octets) {
+            self.sent = Some(Some(telegram.start));
+        }
+    }
+    fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
+        match what {
+            _ if stamp.station != self.master => {}
+            // A SYNCH that the scenario takes away is never a telegram.
+            Observation::Disturbed { how: Disturbance::Lost, .. } => self.sent = Some(None),
+            Observation::CycleStart { .. } => self.begun = Some(stamp.at),
+            _ => {}
+        }
+    }
+}
+
+/// A network before a cycle.
+pub(super) struct Fork<Q> {
+    pub(super) network: Network<Node, Q>,
+    /// When the cycle begins: first bit of its SYNCH, or t0 without one.
+    pub(super) begin: Time,
+}
+
+/// The network of `scenario` as it is before `cycle`; `recorder` has seen everything until then.
+///
+/// # Errors
+/// The run has no such cycle.
+pub(super) fn fork<Q: Queue<NetworkEvent> + Clone, R: Recorder>(
+    scenario: &Scenario,
+    cycle: u64,
+    recorder: &mut R,
+) -> Result<Fork<Q>, ReplayError> {
+    let mut network: Network<Node, Q> = build::network(scenario);
+    let end = End::of(scenario);
+    let at = end.at.unwrap_or(Time::MAX);
+    let over = |network: &Network<Node, Q>| end.cycle.is_some_and(|last| network.cycles() > last);
+    let too_late = |network: &Network<Node, Q>| match network.cycles().checked_sub(1) {
+        Some(last) => ReplayError::NoSuchCycle { wanted: cycle, last },
+        None => ReplayError::NoCycle,
+    };
+    // As far as the beginning of the cycle before.
+    while network.cycles() < cycle {
+        if over(&network) || network.run(Until::Time(at), 1, recorder) {
+            return Err(too_late(&network));
+        }
+    }
+    let mut probe = network.clone();
+    let mut scout = Scout { master: scenario.master.address, sent: None, begun: None };
+    let (mut events, mut last) = (0, None);
+    let t0 = loop {
+        if over(&probe) || probe.run(Until::Time(at), 1, &mut scout) {
+            return Err(too_late(&probe));
+        }
+        if let Some(start) = scout.sent.take() {
+            last = Some((events, start));
+        }
+        if let Some(t0) = scout.begun {
+            break t0;
+        }
+        events += 1;
+    };
+    let (before, start) = last.unwrap_or((events, None));
+    network.run(Until::Time(at), before, recorder);
+    Ok(Fork { network, begin: start.unwrap_or(t0) })
+}

@@ -1,0 +1,90 @@
+//! What if: from some cycle on, another future beside the one that was.
+//!
+//! The scenario runs to the cycle, the network is copied, the world around the copy's stations is changed, and both go
+//! on side by side. Until the cycle begins, with the first bit of its SYNCH, both do the same.
+
+pub mod command;
+mod fork;
+mod world;
+
+use super::difference::{Differences, End, Race, Runner};
+use super::replay::ReplayError;
+use super::scenario::Scenario;
+use crate::sim::network::NetworkEvent;
+use crate::sim::queue::Queue;
+use crate::sim::record::Recorder;
+use crate::time::{Span, Time};
+
+/// Why there is no other future.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum WhatIfError {
+    /// The run does not come so far.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// Something would change that only a new start-up can.
+    #[error(
+        "{keys}: this cannot change while the network runs\n  rule: a station keeps what it was built with and what \
+         Set_Prm told it; what can change is around it: {}\n  help: for a whole run with it, use --run-set instead of --set",
+        world::KEYS
+    )]
+    Station {
+        /// Which overrides.
+        keys: String,
+    },
+    /// An order that would have come before.
+    #[error(
+        "an event before cycle {cycle} is not the same: what has happened cannot change\n  help: give it an instant after the beginning of cycle {cycle}"
+    )]
+    Past {
+        /// The cycle from which on the future is another.
+        cycle: u64,
+    },
+}
+
+/// Two futures of one run.
+#[derive(Debug)]
+pub struct Futures<R> {
+    /// When they part.
+    pub from: Time,
+    /// What they differ in.
+    pub differences: Differences,
+    /// The end of each, and what rode along: first that of the original, then that of the other.
+    pub ends: [(Time, R); 2],
+}
+
+/// Runs `original` with `rider` until `cycle` begins, and from there on beside `altered`; for `window` cycles, or to
+/// the end of the run.
+///
+/// # Errors
+/// The run has no such cycle, or a network that runs cannot become `altered`.
+///
+/// # Panics
+/// If a scenario breaks a rule that reading it checks.
+pub fn futures<Q: Queue<NetworkEvent> + Clone, R: Recorder + Clone>(
+    [original, altered]: [&Scenario; 2],
+    (cycle, window): (u64, Option<u64>),
+    mut rider: R,
+) -> Result<Futures<R>, WhatIfError> {
+    if !world::can_change(original, altered) {
+        return Err(WhatIfError::Station { keys: String::new() });
+    }
+    let fork = fork::fork::<Q, R>(original, cycle, &mut rider)?;
+    let from = fork.begin;
+    if !world::same_past(original, altered, from, cycle) {
+        return Err(WhatIfError::Past { cycle });
+    }
+    let mut other = fork.network.clone();
+    world::change_line(&mut other, [original, altered]);
+    let mut end = End::of(original);
+    if let Some(window) = window {
+        end = end.or_cycle(cycle.saturating_add(window));
+    }
+    let before = cycle.checked_sub(1);
+    let runner = |network, rider| Runner { network, master: original.master.address, cycle: before, end, rider };
+    let runners = [runner(fork.network, rider.clone()), runner(other, rider)];
+    let mut race = Race::of(runners, original.master.t_dp);
+    race.advance(from - Span::from_ticks(1));
+    world::change_rest(race.begin(cycle), [original, altered], cycle);
+    let (differences, ends) = race.run();
+    Ok(Futures { from, differences, ends })
+}

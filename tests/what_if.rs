@@ -1,0 +1,160 @@
+//! Another future of a run: the same without a change, and with one the same until it takes effect.
+
+use isodp::observation::Observation;
+use isodp::sim::fingerprint::Fingerprints;
+use isodp::sim::network::NetworkEvent;
+use isodp::sim::queue::{HeapQueue, NearQueue};
+use isodp::study::difference::{Happening, What};
+use isodp::study::run::run;
+use isodp::study::scenario::Scenario;
+use isodp::study::what_if::{Futures, WhatIfError, futures};
+use isodp::time::Span;
+
+use crate::support::{address, scenario, shipped};
+
+type Near = NearQueue<NetworkEvent>;
+type Set<'a> = (&'a str, &'a str);
+
+const SHORT: Set<'static> = ("run.duration", "1 s");
+
+fn rider(scenario: &Scenario) -> Fingerprints {
+    Fingerprints::new(scenario.master.address)
+}
+/// The shipped scenario, at most 2 s of it where it says nothing of later.
+fn whole(name: &str) -> Scenario {
+    let path = format!("{}/scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let sets = [("run.duration".to_owned(), "2 s".to_owned())];
+    Scenario::load(path.as_ref(), &sets).unwrap_or_else(|_| scenario(name, &[]))
+}
+/// The futures of a shipped scenario from `cycle` on, with `sets` from there.
+fn part(name: &str, sets: &[Set<'_>], cycle: u64) -> Futures<Fingerprints> {
+    let original = scenario(name, &[SHORT]);
+    let altered = scenario(name, &[&[SHORT], sets].concat());
+    futures::<Near, _>([&original, &altered], (cycle, None), rider(&original)).unwrap_or_else(|error| panic!("{error}"))
+}
+fn refused(name: &str, sets: &[Set<'_>], cycle: u64) -> WhatIfError {
+    let original = scenario(name, &[SHORT]);
+    let altered = scenario(name, &[&[SHORT], sets].concat());
+    futures::<Near, _>([&original, &altered], (cycle, None), ()).expect_err("no future")
+}
+
+/// Everything that a network is comes along into its copy: machines, queue, line, streams.
+#[test]
+fn without_a_change_both_futures_are_the_straight_run() {
+    for name in shipped() {
+        let original = whole(&name);
+        let straight = run::<Near>(&original, None, |_| ()).expect("a run without files");
+        for cycle in [0, 57] {
+            let futures = futures::<Near, _>([&original, &original], (cycle, None), rider(&original));
+            let Futures { differences, ends, .. } = futures.unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert_eq!(differences.first(), None, "{name} from {cycle}");
+            for (_, rider) in &ends {
+                assert_eq!(rider.total(), straight.fingerprint, "{name} from {cycle}");
+                assert_eq!(rider.stations().collect::<Vec<_>>(), straight.stations, "{name} from {cycle}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_plain_queue_gives_the_same_futures() {
+    let [original, altered] =
+        [scenario("reference", &[SHORT]), scenario("reference", &[SHORT, ("slave.5.crystal", "40 ppm")])];
+    let near = futures::<Near, _>([&original, &altered], (300, None), rider(&original)).expect("futures");
+    let heap =
+        futures::<HeapQueue<NetworkEvent>, _>([&original, &altered], (300, None), rider(&original)).expect("futures");
+    assert_eq!(near.differences, heap.differences);
+    for (near, heap) in near.ends.iter().zip(&heap.ends) {
+        assert_eq!((near.0, near.1.total()), (heap.0, heap.1.total()));
+    }
+}
+
+/// What changes, and which station must be the first to show it where that is known.
+#[test]
+fn with_a_change_nothing_differs_before_its_cycle() {
+    let sine = "{ kind = \"sine\", amplitude = \"1 rev\", period = \"1 s\" }";
+    for (name, set, cycle, first) in [
+        ("reference", ("master.gc_jitter", "{ kind = \"uniform\", half_width = \"300 ns\" }"), 200, Some(2)),
+        ("reference", ("slave.5.crystal", "-47 ppm"), 200, Some(5)),
+        ("reference", ("master.crystal", "12 ppm"), 200, None),
+        ("reference", ("slave.7.motion", sine), 200, Some(7)),
+        ("gc-loss", ("disturbance.1.cycle", "250"), 250, Some(2)),
+        ("life-sign-loss", ("event.1.cycle", "210"), 210, None),
+        ("free-running", ("slave.3.crystal", "100 ppm"), 120, Some(3)),
+        ("two-masters", ("master.gc_jitter", "{ kind = \"uniform\", half_width = \"300 ns\" }"), 100, Some(2)),
+    ] {
+        let Futures { from, differences, ends } = part(name, &[set], cycle);
+        let difference = differences.first().unwrap_or_else(|| panic!("{name}, {set:?}: no difference"));
+        assert!(difference.cycle() >= Some(cycle), "{name}, {set:?}: {difference}");
+        // A SYNCH that strays the other way is earlier than the one that begins the cycle, and that one is lost is known
+        // as soon as the master has decided on it.
+        let lost = set.0.starts_with("disturbance");
+        assert!(lost || difference.at() >= from - Span::from_us(1), "{name}, {set:?}: {difference}");
+        assert!(first.is_none_or(|first| difference.station == address(first)), "{name}, {set:?}: {difference}");
+        assert_ne!(ends[0].1.total(), ends[1].1.total(), "{name}, {set:?}");
+        let [before, now] = difference.values();
+        assert_ne!(before, now, "{name}, {set:?}");
+    }
+}
+
+#[test]
+fn a_clock_can_be_lost_in_the_very_cycle() {
+    let Futures { differences, .. } = part("gc-loss", &[("disturbance.1.cycle", "250")], 250);
+    let difference = differences.first().expect("a difference");
+    assert_eq!((difference.cycle(), difference.station), (Some(250), address(2)), "{difference}");
+    let (before, now) = (difference.before.as_ref().expect("SYNCH"), difference.now.as_ref().expect("no SYNCH"));
+    assert!(before.is_synch(), "{difference}");
+    assert!(matches!(now.what, What::Observation(Observation::Disturbed { .. })), "{difference}");
+}
+
+/// A shaft that another motion takes over goes on from where it is: the first latch after it is near the one before.
+#[test]
+fn a_shaft_does_not_jump() {
+    let Futures { differences, .. } = part("reference", &[("slave.7.motion", "{ kind = \"standstill\" }")], 300);
+    let difference = differences.first().expect("a difference");
+    let position = |happening: &Option<Happening>| match happening.as_ref().map(|happening| &happening.what) {
+        Some(What::Observation(Observation::Latch { inputs, .. })) => inputs.xist1,
+        other => panic!("{other:?}"),
+    };
+    let (before, now) = (position(&difference.before), position(&difference.now));
+    let device = scenario("reference", &[]).slaves[0].resolution();
+    let revolution = f64::from(u32::MAX) / f64::from(device.revolutions);
+    let turned = f64::from(before.wrapping_sub(now) as i32) / revolution;
+    // 1500 rpm are 25 rev/s: 0.05 rev in 2 ms.
+    assert!(before != now && turned.abs() <= 0.051, "{before} {now}: {turned} rev");
+}
+
+#[test]
+fn the_original_is_the_straight_run_whatever_the_other_does() {
+    let original = scenario("reference", &[SHORT]);
+    let straight = run::<Near>(&original, None, |_| ()).expect("a run without files");
+    let Futures { ends, .. } = part("reference", &[("master.crystal", "12 ppm")], 200);
+    assert_eq!(ends[0].1.total(), straight.fingerprint);
+}
+
+#[test]
+fn a_window_ends_both() {
+    let original = scenario("reference", &[SHORT]);
+    let altered = scenario("reference", &[SHORT, ("slave.5.crystal", "-47 ppm")]);
+    let Futures { ends, from, .. } =
+        futures::<Near, _>([&original, &altered], (200, Some(10)), ()).unwrap_or_else(|error| panic!("{error}"));
+    for (end, ()) in ends {
+        let cycles = (end - from).as_ms() / 2.0;
+        assert!((9.5..10.5).contains(&cycles), "{cycles} cycles");
+    }
+}
+
+#[test]
+fn what_stations_keep_cannot_change() {
+    for set in [("master.t_o", "1.5 ms"), ("slave.5.t_sdr", "40 tbit"), ("run.seed", "9"), ("bus.cable", "50 m")] {
+        assert!(matches!(refused("reference", &[set], 100), WhatIfError::Station { .. }), "{set:?}");
+    }
+}
+#[test]
+fn what_has_happened_cannot_change() {
+    assert_eq!(refused("life-sign-loss", &[("event.1.cycle", "99")], 100), WhatIfError::Past { cycle: 100 });
+}
+#[test]
+fn a_cycle_that_never_comes_is_an_error() {
+    assert!(matches!(refused("reference", &[], 1_000_000), WhatIfError::Replay(_)));
+}
