@@ -228,6 +228,7 @@ fn a_disturbance_of_another_future_is_that_of_a_run_with_it() {
         "kind = \"crystal-offset\"; stations = \"2..3\"; offset = \"30 ppm\"; at = \"450 ms\"; for = \"50 ms\"",
         "kind = \"temperature-step\"; station = 4; offset = \"50 ppm\"; time_constant = \"20 ms\"; cycle = 220; for = 40",
         "kind = \"hold-life-sign\"; stations = \"all slaves\"; cycle = 190; for = 1",
+        "kind = \"gc-jitter\"; shape = \"uniform\"; half_width = \"200 ns\"; cycle = 200; for = 90",
     ] {
         let with = tables(&[keys]);
         let whole = [Run::of(&scene("")).fingerprint, Run::of(&scene(&with)).fingerprint];

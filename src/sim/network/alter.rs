@@ -7,8 +7,8 @@ use super::{Network, NetworkEvent};
 use crate::fdl::Station;
 use crate::sim::crystal::{Crystal, CrystalError};
 use crate::sim::fault::Faults;
+use crate::sim::jitter::{GcJitter, JitterError};
 use crate::sim::motion::Shaft;
-use crate::sim::noise::{GcJitter, JitterError};
 use crate::sim::queue::Queue;
 use crate::wire::Address;
 
@@ -23,6 +23,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// From now on these are the disturbances.
     pub fn set_faults(&mut self, mut faults: Faults) {
         let turning = faults.take_turning();
+        faults.go_on_from(&self.faults);
         self.faults = faults;
         self.turn_over(turning);
     }
@@ -37,7 +38,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         if ppb.abs() > Crystal::MAX_PPB {
             return Err(CrystalError::Offset(ppb));
         }
-        self.slots[slot].ppb = ppb;
+        self.slots[slot].offset.own = ppb;
         self.set_rate(slot);
         Ok(())
     }

@@ -25,7 +25,7 @@ pub(super) struct Turning<C> {
     turns: Turns,
     /// It is no more among the disturbances: a burst that goes on ends, and no other begins.
     retired: bool,
-    /// Whom it is told of: the stations that it means.
+    /// Whom it is told of: the stations that it means, or the first station.
     pub slots: Vec<usize>,
     pub effect: Effect<C>,
 }
@@ -73,12 +73,15 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     fn add_turning(&mut self, new: fault::Turning) {
         let fault::Turning { number, name, turns, what, pulls } = new;
-        let slots = what.stations().iter().filter_map(|&station| self.slot_of(station)).collect();
+        let mut slots: Vec<_> = what.stations().iter().filter_map(|&station| self.slot_of(station)).collect();
+        if slots.is_empty() {
+            slots.push(Self::CLOCK);
+        }
         let effect = match what {
             What::Station(_, StationFault::Restart) => Effect::Supply,
             What::Crystal(_, fault) => Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false }),
             What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
-            What::Line(_) | What::Station(..) => Effect::None,
+            What::Line(_) | What::Station(..) | What::Clock(..) => Effect::None,
         };
         self.turning.push(Turning { number, name, what, turns, retired: false, slots, effect });
         self.plan_turn(self.turning.len() - 1);
@@ -87,7 +90,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let Turning { turns, retired, slots, .. } = &mut self.turning[index];
         *retired = true;
         if turns.is_on() {
-            let slot = slots.first().copied().unwrap_or(Self::CLOCK);
+            let slot = slots[0];
             self.push(self.now, Phase::Command, slot, Event::Turn(index as u16));
         }
     }
@@ -114,7 +117,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         if *retired {
             return;
         }
-        let slot = slots.first().copied().unwrap_or(Self::CLOCK);
+        let slot = slots[0];
         match turns.next() {
             None => {}
             Some(Turn::Cycle(cycle)) => self.next_turn = self.next_turn.min(cycle as u64),
@@ -155,9 +158,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let slot = self.turning[index].slots[place];
             self.tell(slot, &Observation::Disturbed { number, how }, recorder);
             if let Effect::Supply = self.turning[index].effect {
-                let outages = &mut self.slots[slot].outages;
+                let outages = &mut self.slots[slot].supply.outages;
                 *outages = if on { *outages + 1 } else { *outages - 1 };
-                self.supply(slot, recorder);
+                self.update_supply(slot, recorder);
             }
         }
         match self.turning[index].effect {
