@@ -73,7 +73,7 @@ enum Command {
     Plan(PlanArgs),
     /// Shares out the clock window T_PLL_W of each encoder among jitter, crystals and timer grid, by switching them off.
     #[command(after_help = EXAMPLES)]
-    Budget(RunArgs),
+    Budget(BudgetArgs),
     /// Runs a scenario again and tells a stretch of it, every telegram and every observation, line by line.
     #[command(after_help = EXAMPLES)]
     Replay(ReplayArgs),
@@ -159,6 +159,22 @@ struct ReplayArgs {
     /// Changes a value for the whole run, as --set of isodp run does. May be given several times.
     #[arg(long = "run-set", value_name = "KEY=VALUE", value_parser = assignment)]
     run_sets: Vec<(String, String)>,
+}
+
+#[derive(Args)]
+struct BudgetArgs {
+    /// Scenario file (TOML).
+    #[arg(value_name = "FILE")]
+    scenario: PathBuf,
+    /// Seed of all random streams, instead of the scenario's.
+    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
+    seed: Option<u64>,
+    /// Directory for the results; they go to DIR/<scenario>/.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    sets: Vec<(String, String)>,
 }
 
 #[derive(Args)]
@@ -259,9 +275,9 @@ fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error
     Ok((answer.page, code))
 }
 
-fn budget_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
+fn budget_command(args: BudgetArgs) -> Result<String, Box<dyn std::error::Error>> {
     let scenario = Scenario::load(&args.scenario, &with_seed(args.sets, args.seed))?;
-    for warning in warnings(&scenario) {
+    for warning in batch::warnings_of(std::slice::from_ref(&scenario)) {
         let _ = writeln!(anstream::stderr(), "warning: {warning}");
     }
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());

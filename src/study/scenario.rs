@@ -15,6 +15,7 @@ mod expect;
 #[cfg(test)]
 mod faults;
 mod gsd;
+mod jitter;
 pub mod kinds;
 mod link;
 mod options;
@@ -40,8 +41,8 @@ pub use crate::sim::fault::line::{Effect, LineFault};
 pub use crate::sim::fault::which::{Service, Which};
 pub use crate::sim::fault::window::{Bursts, Window};
 pub use crate::sim::fault::{Disturbance, What};
+use crate::sim::jitter::GcJitter;
 use crate::sim::motion::Motion;
-use crate::sim::noise::GcJitter;
 use crate::study::verdict::Expectation;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
@@ -322,7 +323,7 @@ impl Bus {
 }
 
 /// The master with its application.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Master {
     /// Its address, 0..=125.
     pub address: Address,

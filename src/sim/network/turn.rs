@@ -20,8 +20,12 @@ use crate::wire::Address;
 pub(super) struct Turning<C> {
     /// Number of the disturbance in the scenario, from 0.
     number: u16,
+    name: String,
+    what: What,
     turns: Turns,
-    /// Whom it is told of: the stations that it means.
+    /// It is no more among the disturbances: a burst that goes on ends, and no other begins.
+    retired: bool,
+    /// Whom it is told of: the stations that it means, or the first station.
     pub slots: Vec<usize>,
     pub effect: Effect<C>,
 }
@@ -42,18 +46,52 @@ pub(super) enum Effect<C> {
 impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Takes in the disturbances that begin and end.
     pub(super) fn disturb(&mut self, all: Vec<fault::Turning>) {
-        for fault::Turning { number, turns, what, pulls } in all {
-            let slots = what.stations().iter().filter_map(|&station| self.slot_of(station)).collect();
-            let effect = match what {
-                What::Station(_, StationFault::Restart) => Effect::Supply,
-                What::Crystal(_, fault) => {
-                    Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false })
-                }
-                What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
-                What::Line(_) | What::Station(..) => Effect::None,
-            };
-            self.turning.push(Turning { number, turns, slots, effect });
-            self.plan_turn(self.turning.len() - 1);
+        for disturbance in all {
+            self.add_turning(disturbance);
+        }
+    }
+    /// From now on these are the disturbances that begin and end. One that was there before goes on as it is, any other
+    /// begins where its window is now.
+    pub(super) fn turn_over(&mut self, all: Vec<fault::Turning>) {
+        let known = |turning: &Turning<_>, new: &fault::Turning| {
+            !turning.retired
+                && (&turning.name, &turning.what) == (&new.name, &new.what)
+                && turning.turns.window() == new.turns.window()
+        };
+        for index in 0..self.turning.len() {
+            match all.iter().find(|new| known(&self.turning[index], new)) {
+                Some(new) => self.turning[index].number = new.number,
+                None => self.retire(index),
+            }
+        }
+        for mut new in all {
+            if !self.turning.iter().any(|turning| known(turning, &new)) {
+                new.turns = Turns::from(new.turns.window(), self.now, self.clocks);
+                self.add_turning(new);
+            }
+        }
+    }
+    fn add_turning(&mut self, new: fault::Turning) {
+        let fault::Turning { number, name, turns, what, pulls } = new;
+        let mut slots: Vec<_> = what.stations().iter().filter_map(|&station| self.slot_of(station)).collect();
+        if slots.is_empty() {
+            slots.push(Self::CLOCK);
+        }
+        let effect = match what {
+            What::Station(_, StationFault::Restart) => Effect::Supply,
+            What::Crystal(_, fault) => Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false }),
+            What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
+            What::Line(_) | What::Station(..) | What::Clock(..) => Effect::None,
+        };
+        self.turning.push(Turning { number, name, what, turns, retired: false, slots, effect });
+        self.plan_turn(self.turning.len() - 1);
+    }
+    fn retire(&mut self, index: usize) {
+        let Turning { turns, retired, slots, .. } = &mut self.turning[index];
+        *retired = true;
+        if turns.is_on() {
+            let slot = slots[0];
+            self.push(self.now, Phase::Command, slot, Event::Turn(index as u16));
         }
     }
     fn slot_of(&self, station: Address) -> Option<usize> {
@@ -75,8 +113,11 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
 
     /// Sees to it that the disturbance turns next when it has to.
     fn plan_turn(&mut self, index: usize) {
-        let Turning { turns, slots, .. } = &self.turning[index];
-        let slot = slots.first().copied().unwrap_or(Self::CLOCK);
+        let Turning { turns, slots, retired, .. } = &self.turning[index];
+        if *retired {
+            return;
+        }
+        let slot = slots[0];
         match turns.next() {
             None => {}
             Some(Turn::Cycle(cycle)) => self.next_turn = self.next_turn.min(cycle as u64),
@@ -91,6 +132,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     pub(super) fn turn_in_cycle<R: Recorder>(&mut self, cycle: u64, recorder: &mut R) {
         self.next_turn = u64::MAX;
         for index in 0..self.turning.len() {
+            if self.turning[index].retired {
+                continue;
+            }
             let due = |turns: &Turns| matches!(turns.next(), Some(Turn::Cycle(at)) if at as u64 <= cycle);
             while due(&self.turning[index].turns) {
                 self.turn(index, recorder);
@@ -103,16 +147,20 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// A burst begins or ends.
     #[cold]
     pub(super) fn turn<R: Recorder>(&mut self, index: usize, recorder: &mut R) {
-        let on = self.turning[index].turns.turn();
+        let Turning { turns, retired, .. } = &mut self.turning[index];
+        if *retired && !turns.is_on() {
+            return;
+        }
+        let on = turns.turn();
         let number = self.turning[index].number;
         let how = if on { Disturbance::Begins } else { Disturbance::Ends };
         for place in 0..self.turning[index].slots.len() {
             let slot = self.turning[index].slots[place];
             self.tell(slot, &Observation::Disturbed { number, how }, recorder);
             if let Effect::Supply = self.turning[index].effect {
-                let outages = &mut self.slots[slot].outages;
+                let outages = &mut self.slots[slot].supply.outages;
                 *outages = if on { *outages + 1 } else { *outages - 1 };
-                self.supply(slot, recorder);
+                self.update_supply(slot, recorder);
             }
         }
         match self.turning[index].effect {

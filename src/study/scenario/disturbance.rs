@@ -3,6 +3,7 @@
 
 pub(super) mod application;
 pub(super) mod clock;
+mod gc_jitter;
 mod line;
 mod manner;
 pub(super) mod station;
@@ -55,6 +56,7 @@ pub const DISTURBANCES: &[DisturbanceKind] = &[
     station::MUTE,
     station::DEAF,
     station::RESTART,
+    gc_jitter::GC_JITTER,
     clock::CRYSTAL_OFFSET,
     clock::CRYSTAL_WANDER,
     clock::TEMPERATURE_STEP,

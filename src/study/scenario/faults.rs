@@ -976,8 +976,8 @@ fn every_kind_can_be_read() {
         let scenario = good(&[("slave.3.motion", &table)]);
         assert!(format!("{:?}", scenario.slaves[0].motion).to_lowercase().starts_with(kind.name));
     }
-    for kind in crate::sim::noise::KINDS {
-        let values = kind.parameters.iter().map(|key| format!(", {key} = \"1 us\"")).collect::<Vec<_>>().concat();
+    for kind in crate::sim::jitter::KINDS {
+        let values = kind.keys.iter().map(|(key, example)| format!(", {key} = {example}")).collect::<Vec<_>>().concat();
         let scenario = good(&[("master.gc_jitter", &format!("{{ kind = \"{}\"{values} }}", kind.name))]);
         assert_eq!(scenario.master.gc_jitter.kind(), kind);
     }

@@ -7,6 +7,7 @@ use super::disturbance;
 use super::error::Fault;
 use super::expect;
 use super::gsd;
+use super::jitter;
 use super::kinds::{self, ACTIONS, Kind, address};
 use super::link::link;
 use super::options;
@@ -21,8 +22,8 @@ use super::{
 use crate::device::profile::Profile;
 use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
+use crate::sim::jitter::GcJitter;
 use crate::sim::motion::{Angle, Motion};
-use crate::sim::noise::GcJitter;
 use crate::study::plan::Plan;
 use crate::study::quantity::{bit_rate, ppb, tbit};
 use crate::time::{BitRate, Span, Tbit};
@@ -408,7 +409,7 @@ fn master(
     let position_mm = s.optional(reader, "position", cable).unwrap_or(0);
     let jitter = s.table(reader, "gc_jitter");
     let (gc_jitter, accumulate) =
-        jitter.and_then(|inner| kinds::gc_jitter(inner, reader)).unwrap_or((GcJitter::None, false));
+        jitter.and_then(|inner| jitter::of_master(inner, reader)).unwrap_or((GcJitter::None, false));
     let life_start = s.optional(reader, "life_start", number(1..=15)).unwrap_or(1);
     let life_delay = s.optional(reader, "life_delay", number(0..=u32::MAX)).unwrap_or(0);
     let active_spare = s.optional(reader, "active_spare", yes).unwrap_or(false);
