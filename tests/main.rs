@@ -1,6 +1,7 @@
 //! The tests of the whole, in one binary.
 
 mod acyclic;
+mod budget;
 mod cli;
 mod determinism;
 mod devices;

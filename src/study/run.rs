@@ -13,7 +13,7 @@ use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, MasterLayout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
 use super::plan::rules;
-use super::plot::{BusCycle, Distribution, Distributions, LinkLatencies, PlotError, PlotMeta, Plots};
+use super::plot::{BusCycle, Distribution, Distributions, EpisodeTimes, LinkLatencies, PlotError, PlotMeta, Plots};
 use super::row::Sink;
 use super::scenario::{Extent, Scenario};
 use super::summary::{Facts, SlaveFacts, Summary};
@@ -205,8 +205,9 @@ fn conclude(
 
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &plots, bus) {
-        pictures = stage(dir, plots.pictures(&distributions(figures.histograms()), bus)?)?;
-        summary.files.extend(plots.files().map(str::to_owned));
+        let drawn = plots.pictures(&distributions(&figures), bus)?;
+        summary.files.extend(drawn.iter().map(|picture| picture.0.to_owned()));
+        pictures = stage(dir, drawn)?;
     }
     if let Some(dir) = &dir {
         pictures.extend(stage(dir, vec![(TOPOLOGY, map.text(true).join("\n") + "\n")])?);
@@ -273,6 +274,7 @@ fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
         links: layout.links().to_vec(),
         masters: 1 + scenario.class1.len() + scenario.class2.len(),
         duration: scenario.master.t_dp * cycles(scenario) as i64,
+        disturbances: scenario.disturbances.iter().map(|disturbance| disturbance.name.clone()).collect(),
         topology: Map::of(scenario),
     }
 }
@@ -293,8 +295,9 @@ fn facts(scenario: &Scenario) -> Facts {
     }
 }
 
-/// What the pictures show of the histograms.
-fn distributions(histograms: &Histograms) -> Distributions {
+/// What the pictures show of the figures.
+fn distributions(figures: &Figures) -> Distributions {
+    let histograms = figures.histograms();
     let of = |name: &str, subject| {
         let quantity = Quantity::named(name).expect("a line of the registry");
         histograms.get(name, subject).map_or_else(Distribution::default, |found| distribution(quantity, found))
@@ -309,6 +312,7 @@ fn distributions(histograms: &Histograms) -> Distributions {
         t_dp_deviation: of("t_dp_deviation", Subject::Network),
         synch_delay: of("synch_delay", Subject::Network),
         links: histograms.layout().links().iter().map(link).collect(),
+        episodes: EpisodeTimes::all(figures.episodes()),
     }
 }
 
