@@ -13,6 +13,7 @@ mod encoder;
 mod encoder_scenarios;
 mod episodes;
 mod figures;
+mod flight;
 mod foreign;
 mod golden;
 mod gsd;
