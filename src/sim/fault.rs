@@ -8,6 +8,7 @@ pub mod damage;
 pub mod line;
 pub mod manner;
 pub mod order;
+pub mod source;
 pub mod station;
 pub mod turn;
 pub mod which;
@@ -16,6 +17,7 @@ pub mod window;
 use crate::sim::fault::clock::{CrystalFault, Pull};
 use crate::sim::fault::line::{Line, LineFault};
 use crate::sim::fault::order::OrderFault;
+use crate::sim::fault::source::{Source, SourceFault};
 use crate::sim::fault::station::{Apart, StationFault};
 use crate::sim::fault::turn::Turns;
 use crate::sim::fault::window::Window;
@@ -38,6 +40,8 @@ pub struct Disturbance {
 pub enum What {
     /// It decides what becomes of telegrams.
     Line(LineFault),
+    /// It puts something on the line.
+    Source(SourceFault),
     /// It takes stations off the line, or their supply away.
     Station(Vec<Address>, StationFault),
     /// It changes the rate of crystals.
@@ -50,7 +54,7 @@ impl What {
     /// The stations that it means, where it names them.
     pub fn stations(&self) -> &[Address] {
         match self {
-            Self::Line(_) => &[],
+            Self::Line(_) | Self::Source(_) => &[],
             Self::Station(stations, _) | Self::Crystal(stations, _) | Self::Order(stations, _) => stations,
         }
     }
@@ -65,6 +69,8 @@ pub(super) struct Turning {
     pub what: What,
     /// What it makes of each station's crystal, in the order of the stations.
     pub pulls: Vec<Pull>,
+    /// What it puts on the line, if it does.
+    pub source: Option<Box<Source>>,
 }
 
 /// All disturbances of a network at work.
@@ -85,7 +91,7 @@ impl Faults {
             match what {
                 What::Line(fault) => faults.line.add((number, name, *window), *fault, (seed, stations)),
                 What::Station(stations, fault) => faults.apart.push(Apart::new(stations, *window, *fault)),
-                What::Crystal(..) | What::Order(..) => {}
+                What::Source(_) | What::Crystal(..) | What::Order(..) => {}
             }
             if matches!(what, What::Line(_)) {
                 continue;
@@ -95,7 +101,11 @@ impl Faults {
                 _ => None,
             };
             let pulls = what.stations().iter().filter_map(pull).collect();
-            faults.turning.push(Turning { number, turns: Turns::new(*window), what: what.clone(), pulls });
+            let source = match what {
+                What::Source(fault) => Some(Box::new(Source::new(name, fault.clone(), seed))),
+                _ => None,
+            };
+            faults.turning.push(Turning { number, turns: Turns::new(*window), what: what.clone(), pulls, source });
         }
         faults
     }

@@ -46,6 +46,15 @@ impl Turns {
         let at = if self.on { bursts.end(self.burst) } else { bursts.begin(self.burst) };
         at.map(turn)
     }
+    /// Leaves out every turn before this tick and before this cycle.
+    pub fn skip(&mut self, tick: i64, cycle: i64) {
+        while self.next().is_some_and(|turn| match turn {
+            Turn::Time(at) => at < tick,
+            Turn::Cycle(at) => at < cycle,
+        }) {
+            self.turn();
+        }
+    }
     /// It turns. Whether a burst begins; otherwise one ends.
     pub const fn turn(&mut self) -> bool {
         self.on = !self.on;
@@ -80,6 +89,21 @@ mod tests {
         let dense = Bursts { from: 1, length: Some(2), every: Some(2), times: None };
         let expected = [(1, true), (3, false), (3, true), (5, false), (5, true), (7, false)];
         assert_eq!(turns(Window::Cycles(dense)), expected.map(|(at, on)| (Turn::Cycle(at), on)));
+    }
+
+    #[test]
+    fn what_is_past_is_left_out() {
+        let bursts = Bursts { from: 4, length: Some(3), every: Some(8), times: Some(2) };
+        for (now, on, next) in [(0, false, Some(4)), (4, false, Some(4)), (5, true, Some(7)), (13, true, Some(15))] {
+            let (mut time, mut cycles) = (Turns::new(Window::Time(bursts)), Turns::new(Window::Cycles(bursts)));
+            time.skip(now, i64::MAX);
+            cycles.skip(i64::MAX, now);
+            assert_eq!((time.is_on(), time.next()), (on, next.map(Turn::Time)), "{now}");
+            assert_eq!((cycles.is_on(), cycles.next()), (on, next.map(Turn::Cycle)), "{now}");
+        }
+        let mut over = Turns::new(Window::Time(bursts));
+        over.skip(100, 0);
+        assert_eq!((over.is_on(), over.next()), (false, None));
     }
 
     #[test]

@@ -20,8 +20,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     pub fn change_jitter(&mut self, jitter: GcJitter) -> Result<(), JitterError> {
         self.jitter.change(jitter)
     }
-    /// From now on these are the disturbances.
-    pub fn set_faults(&mut self, faults: Faults) {
+    /// From now on these are the disturbances. What one would have put on the line at a beginning that is past does not
+    /// come.
+    pub fn set_faults(&mut self, mut faults: Faults) {
+        self.replace_sources(faults.take_turning());
         self.faults = faults;
     }
     /// The crystal of the station at `address` goes on `ppb` fast (10^-9), without a step in its reading. What the

@@ -8,6 +8,7 @@ use super::{Event, Network, NetworkEvent, Phase, Queue};
 use crate::fdl::Station;
 use crate::observation::{Disturbance, Observation};
 use crate::sim::fault::order::OrderFault;
+use crate::sim::fault::source::Source;
 use crate::sim::fault::station::StationFault;
 use crate::sim::fault::turn::{Turn, Turns};
 use crate::sim::fault::{self, What};
@@ -19,8 +20,8 @@ use crate::wire::Address;
 #[derive(Clone)]
 pub(super) struct Turning<C> {
     /// Number of the disturbance in the scenario, from 0.
-    number: u16,
-    turns: Turns,
+    pub number: u16,
+    pub turns: Turns,
     /// Whom it is told of: the stations that it means.
     pub slots: Vec<usize>,
     pub effect: Effect<C>,
@@ -35,6 +36,8 @@ pub(super) enum Effect<C> {
     Supply,
     /// Crystals run at other rates.
     Crystals(Tuning),
+    /// Something comes onto the line.
+    Source(Box<Source>),
     /// Orders to masters.
     Orders { fault: OrderFault, begin: Vec<(usize, C)>, end: Vec<(usize, C)> },
 }
@@ -42,7 +45,7 @@ pub(super) enum Effect<C> {
 impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Takes in the disturbances that begin and end.
     pub(super) fn disturb(&mut self, all: Vec<fault::Turning>) {
-        for fault::Turning { number, turns, what, pulls } in all {
+        for fault::Turning { number, turns, what, pulls, source } in all {
             let slots = what.stations().iter().filter_map(|&station| self.slot_of(station)).collect();
             let effect = match what {
                 What::Station(_, StationFault::Restart) => Effect::Supply,
@@ -50,13 +53,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                     Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false })
                 }
                 What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
-                What::Line(_) | What::Station(..) => Effect::None,
+                What::Line(_) | What::Source(_) | What::Station(..) => source.map_or(Effect::None, Effect::Source),
             };
             self.turning.push(Turning { number, turns, slots, effect });
             self.plan_turn(self.turning.len() - 1);
         }
     }
-    fn slot_of(&self, station: Address) -> Option<usize> {
+    pub(super) fn slot_of(&self, station: Address) -> Option<usize> {
         self.by_address[usize::from(station.get())].map(usize::from)
     }
     /// What the disturbance of this number, from 0, orders when a burst begins and when one ends.
@@ -74,7 +77,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// Sees to it that the disturbance turns next when it has to.
-    fn plan_turn(&mut self, index: usize) {
+    pub(super) fn plan_turn(&mut self, index: usize) {
         let Turning { turns, slots, .. } = &self.turning[index];
         let slot = slots.first().copied().unwrap_or(Self::CLOCK);
         match turns.next() {
@@ -118,7 +121,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         match self.turning[index].effect {
             Effect::Crystals(_) => self.turn_crystals(index, on),
             Effect::Orders { fault, .. } => self.order_burst((index, fault), on, recorder),
-            Effect::None | Effect::Supply => {}
+            Effect::Source(_) if on => self.start_source(index),
+            Effect::Source(_) | Effect::None | Effect::Supply => {}
         }
         self.plan_turn(index);
     }
