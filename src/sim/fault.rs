@@ -8,6 +8,7 @@ pub mod damage;
 pub mod line;
 pub mod manner;
 pub mod order;
+pub mod source;
 pub mod station;
 pub mod turn;
 pub mod which;
@@ -16,6 +17,7 @@ pub mod window;
 use crate::sim::fault::clock::{CrystalFault, Pull};
 use crate::sim::fault::line::{Line, LineFault};
 use crate::sim::fault::order::OrderFault;
+use crate::sim::fault::source::{Source, SourceFault};
 use crate::sim::fault::station::{Apart, StationFault};
 use crate::sim::fault::turn::Turns;
 use crate::sim::fault::window::Window;
@@ -40,6 +42,8 @@ pub struct Disturbance {
 pub enum What {
     /// It decides what becomes of telegrams.
     Line(LineFault),
+    /// It puts something on the line.
+    Source(SourceFault),
     /// It takes stations off the line, or their supply away.
     Station(Vec<Address>, StationFault),
     /// It changes the rate of crystals.
@@ -54,7 +58,7 @@ impl What {
     /// The stations that it means, where it names them.
     pub fn stations(&self) -> &[Address] {
         match self {
-            Self::Line(_) | Self::Clock(..) => &[],
+            Self::Line(_) | Self::Clock(..) | Self::Source(_) => &[],
             Self::Station(stations, _) | Self::Crystal(stations, _) | Self::Order(stations, _) => stations,
         }
     }
@@ -70,6 +74,8 @@ pub(super) struct Turning {
     pub what: What,
     /// What it makes of each station's crystal, in the order of the stations.
     pub pulls: Vec<Pull>,
+    /// What it puts on the line, if it does.
+    pub source: Option<Box<Source>>,
 }
 
 /// All disturbances of a network at work.
@@ -102,7 +108,7 @@ impl Faults {
                     let source = JitterSource::of_disturbance(jitter.clone(), *window, *accumulates, stream);
                     faults.clocks.push((number, source.expect("a checked jitter")));
                 }
-                What::Crystal(..) | What::Order(..) => {}
+                What::Source(_) | What::Crystal(..) | What::Order(..) => {}
             }
             if matches!(what, What::Line(_)) {
                 continue;
@@ -112,12 +118,17 @@ impl Faults {
                 _ => None,
             };
             let pulls = what.stations().iter().filter_map(pull).collect();
+            let source = match what {
+                What::Source(fault) => Some(Box::new(Source::new(name, fault.clone(), seed))),
+                _ => None,
+            };
             faults.turning.push(Turning {
                 number,
                 name: name.clone(),
                 turns: Turns::new(*window),
                 what: what.clone(),
                 pulls,
+                source,
             });
         }
         faults

@@ -6,7 +6,9 @@ pub(super) mod clock;
 mod gc_jitter;
 mod line;
 mod manner;
+mod source;
 pub(super) mod station;
+pub(super) mod token;
 pub mod which;
 
 use super::error::Fault;
@@ -52,6 +54,9 @@ pub const DISTURBANCES: &[DisturbanceKind] = &[
     line::DUPLICATE_TELEGRAMS,
     line::BIT_ERRORS,
     line::WRONG_OCTET,
+    source::NOISE,
+    source::FOREIGN_TELEGRAM,
+    token::LATE_TOKEN,
     station::SILENT,
     station::MUTE,
     station::DEAF,
