@@ -76,6 +76,10 @@ impl Bus {
             busy_by: 0,
         }
     }
+    /// What the disturbance called `name` adds to the jitter of links counts from now on, or no more.
+    pub fn disturb_link(&mut self, name: &str, on: bool) {
+        self.jitter.iter_mut().for_each(|jitter| jitter.disturb(name, on));
+    }
     /// The delays between the stations.
     pub const fn delays(&self) -> &Delays {
         &self.delays

@@ -508,6 +508,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let jitter = jitter.max(self.now - start);
             start += jitter;
             end += jitter;
+        } else {
+            let delay = self.faults.answer_delay(address, (start, self.clocks_begun(false)));
+            start += delay;
+            end += delay;
         }
         let running = (start, self.clocks_begun(send.clock));
         let lost = self.faults.loses(running, address, send.clock, frame.octets());
@@ -564,14 +568,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// A request for all passes every filter. Only the nearest neighbour is told now and tells the next one when it has
     /// heard, so that the queue holds one event of the telegram, not one for each station. Where links have jitter, who
-    /// is nearest differs from telegram to telegram, and all are told now.
+    /// is nearest differs from telegram to telegram, and all are told now; so where receivers have.
     fn broadcast(&mut self, sender: usize, id: FlightId) {
         let count = self.neighbours[sender].len();
         match count {
             0 => return self.bus.unheard(id),
             count => self.bus.add_listeners(id, count as u16),
         }
-        if self.bus.delays().is_steady() {
+        if self.bus.delays().is_steady() && !self.faults.strays_arrivals() {
             return self.tell_neighbour(id, 0);
         }
         for rank in 0..count {
@@ -586,7 +590,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// The telegram's end reaches `listener`. Of telegrams that end there at one instant the one sent first comes first.
     fn push_telegram(&mut self, listener: usize, id: FlightId, event: Event) {
-        let (at, number) = self.bus.arrival(id, listener);
+        let (mut at, number) = self.bus.arrival(id, listener);
+        if self.faults.strays_arrivals() {
+            let running = (self.bus.flight(id).start, self.clocks_begun(false));
+            at += self.faults.capture_stray(self.slots[listener].address, running);
+            // Nobody hears what has not been said.
+            at = at.max(self.bus.flight(id).end).max(self.now);
+        }
         let key = Key::new(at, Phase::Telegram, self.slots[listener].address.get(), number);
         self.queue.push(key, NetworkEvent(event));
     }

@@ -37,6 +37,8 @@ pub(super) enum Effect<C> {
     None,
     /// The supply goes off and on.
     Supply,
+    /// A link has more jitter.
+    Link,
     /// Crystals run at other rates.
     Crystals(Tuning),
     /// Orders to masters.
@@ -81,7 +83,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             What::Station(_, StationFault::Restart) => Effect::Supply,
             What::Crystal(_, fault) => Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false }),
             What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
-            What::Line(_) | What::Station(..) | What::Clock(..) => Effect::None,
+            What::Repeater(..) => Effect::Link,
+            What::Line(_) | What::Station(..) | What::Clock(..) | What::Instant(..) => Effect::None,
         };
         self.turning.push(Turning { number, name, what, turns, retired: false, slots, effect });
         self.plan_turn(self.turning.len() - 1);
@@ -166,6 +169,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         match self.turning[index].effect {
             Effect::Crystals(_) => self.turn_crystals(index, on),
             Effect::Orders { fault, .. } => self.order_burst((index, fault), on, recorder),
+            Effect::Link => self.bus.disturb_link(&self.turning[index].name, on),
             Effect::None | Effect::Supply => {}
         }
         self.plan_turn(index);

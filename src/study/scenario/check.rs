@@ -67,6 +67,7 @@ static STAGES: &[Stage] = &[
         disturbance::station::are_there,
         disturbance::application::are_slaves,
         disturbance::clock::are_crystals,
+        disturbance::path::in_order,
         services::commands,
         expect::subjects,
     ]),

@@ -5,6 +5,7 @@ pub(super) mod application;
 pub(super) mod clock;
 mod gc_jitter;
 mod line;
+pub(super) mod path;
 pub(super) mod station;
 
 use super::error::Fault;
@@ -54,6 +55,9 @@ pub const DISTURBANCES: &[DisturbanceKind] = &[
     clock::CRYSTAL_OFFSET,
     clock::CRYSTAL_WANDER,
     clock::TEMPERATURE_STEP,
+    path::RECEIVER_JITTER,
+    path::REPEATER_JITTER,
+    path::T_SDR_JITTER,
     application::HOLD_LIFE_SIGN,
     application::JUMP_LIFE_SIGN,
     application::REPEAT_LIFE_SIGN,
