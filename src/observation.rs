@@ -738,6 +738,12 @@ named! {
         Ends = "ends",
         /// It never reached the line.
         Lost = "telegram lost",
+        /// It left late.
+        Late = "telegram late",
+        /// It comes a second time.
+        Doubled = "telegram doubled",
+        /// Some of its bits are wrong.
+        WrongBits = "wrong bits",
     }
 }
 

@@ -75,6 +75,26 @@ fn a_fault_and_its_acknowledgement_allocate_nothing() {
 }
 
 #[test]
+fn disturbances_of_the_line_allocate_nothing() {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/two-masters.toml"));
+    let mut text = text.expect("a scenario").replace("cycles = 1000", "cycles = 3000");
+    for keys in [
+        "kind = \"lost-telegrams\"\nrate = \"1 %\"\nservice = \"data-exchange\"",
+        "kind = \"lost-telegrams\"\npattern = \"x...............\"\nservice = \"fdl-status\"",
+        "kind = \"missing-clocks\"\nrate = \"1 %\"",
+        "kind = \"late-telegrams\"\nup_to = \"2 us\"\nservice = \"replies\"",
+        "kind = \"duplicate-telegrams\"\nrate = \"5 %\"\nservice = \"replies\"",
+        "kind = \"bit-errors\"\nrate = \"1e-5\"",
+        "kind = \"wrong-octet\"\noctet = 8\nflip = 3\nrate = \"1 %\"\nto = 4",
+    ] {
+        text += "\n[[disturbance]]\n";
+        text += keys;
+    }
+    let disturbed = Scenario::parse("line", "line.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
+}
+
+#[test]
 fn a_token_that_goes_round_allocates_nothing() {
     for set in [("bus.gap_factor", "20"), ("bus.gap_factor", "1"), ("bus.t_tr", "300000 tbit")] {
         assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("two-masters", &[set])), 0, "{set:?}");

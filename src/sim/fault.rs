@@ -4,22 +4,26 @@
 //! reaches into a machine. What it draws belongs to its name, so that one more leaves the others' draws as they are.
 
 pub mod clock;
+pub mod damage;
 pub mod instant;
 pub mod line;
+pub mod manner;
 pub mod order;
 pub mod station;
 pub mod turn;
+pub mod which;
 pub mod window;
 
 use crate::sim::fault::clock::{CrystalFault, Pull};
 use crate::sim::fault::instant::{InstantFault, Straying};
-use crate::sim::fault::line::{LineFault, OnLine};
+use crate::sim::fault::line::{Line, LineFault};
 use crate::sim::fault::order::OrderFault;
 use crate::sim::fault::station::{Apart, StationFault};
 use crate::sim::fault::turn::Turns;
 use crate::sim::fault::window::Window;
 use crate::sim::jitter::{GcJitter, JitterSource};
 use crate::sim::noise::{Purpose, Stream};
+use crate::sim::topology::Place;
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -47,6 +51,8 @@ pub enum What {
     Instant(Vec<Address>, InstantFault),
     /// It adds jitter of this half width to the link of this index.
     Repeater(usize, Span),
+    /// It cuts the cable at this place.
+    Cut(Place),
     /// It makes the SYNCH of the isochronous master stray; whether its strays add up, too (Model: D1).
     Clock(GcJitter, bool),
     /// It orders something of the masters of these slaves.
@@ -57,7 +63,7 @@ impl What {
     /// The stations that it means, where it names them.
     pub fn stations(&self) -> &[Address] {
         match self {
-            Self::Line(_) | Self::Clock(..) | Self::Repeater(..) => &[],
+            Self::Line(_) | Self::Clock(..) | Self::Repeater(..) | Self::Cut(_) => &[],
             Self::Station(stations, _)
             | Self::Crystal(stations, _)
             | Self::Instant(stations, _)
@@ -81,7 +87,8 @@ pub(super) struct Turning {
 /// All disturbances of a network at work.
 #[derive(Clone, Debug, Default)]
 pub struct Faults {
-    line: Vec<OnLine>,
+    /// Those of the line.
+    pub line: Line,
     apart: Vec<Apart>,
     /// Jitter of SYNCH, each with the number of its disturbance.
     clocks: Vec<(u16, JitterSource)>,
@@ -93,16 +100,16 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// The disturbances of a run with `seed`, in the order of the scenario.
+    /// The disturbances of a run with `seed` among `stations`, in the order of the scenario.
     ///
     /// # Panics
     /// If a jitter cannot be: the caller checks scenarios.
-    pub fn new(disturbances: &[Disturbance], seed: u64) -> Self {
+    pub fn new(disturbances: &[Disturbance], seed: u64, stations: &[Address]) -> Self {
         let mut faults = Self { all: disturbances.to_vec(), ..Self::default() };
         for (number, Disturbance { name, window, what }) in disturbances.iter().enumerate() {
             let number = number as u16;
             match what {
-                What::Line(fault) => faults.line.push(OnLine { number, window: *window, fault: *fault }),
+                What::Line(fault) => faults.line.add((number, name, *window), *fault, (seed, stations)),
                 What::Station(stations, fault) => faults.apart.push(Apart::new(stations, *window, *fault)),
                 What::Clock(jitter, accumulates) => {
                     let stream = Stream::of_disturbance(seed, name, 0, Purpose::GcJitter);
@@ -116,7 +123,7 @@ impl Faults {
                         InstantFault::Answer { .. } => faults.answers.push(straying),
                     }
                 }
-                What::Crystal(..) | What::Order(..) | What::Repeater(..) => {}
+                What::Crystal(..) | What::Order(..) | What::Repeater(..) | What::Cut(_) => {}
             }
             if matches!(what, What::Line(_)) {
                 continue;
@@ -180,14 +187,6 @@ impl Faults {
     pub(super) fn take_turning(&mut self) -> Vec<Turning> {
         std::mem::take(&mut self.turning)
     }
-
-    /// Number of the disturbance that loses this telegram, if one does. `clock` marks SYNCH; `cycle` is the running
-    /// cycle, for SYNCH the one it begins.
-    pub fn loses(&self, (now, cycle): (Time, u64), sender: Address, clock: bool, octets: &[u8]) -> Option<u16> {
-        let lost = |line: &&OnLine| line.window.contains(now, cycle) && line.fault.loses(sender, clock, octets);
-        self.line.iter().find(lost).map(|line| line.number)
-    }
-
     /// Whether nothing that `station` sends now, in the cycle of this number, reaches the line.
     pub fn mutes(&self, station: Address, running: (Time, u64)) -> bool {
         self.apart.iter().any(|apart| apart.mutes(station, running))

@@ -5,6 +5,7 @@
 
 pub mod bus;
 pub mod crystal;
+pub mod cut;
 pub mod fault;
 pub mod fingerprint;
 pub mod jitter;
@@ -13,4 +14,5 @@ pub mod network;
 pub mod noise;
 pub mod queue;
 pub mod record;
+pub mod share;
 pub mod topology;

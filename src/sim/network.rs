@@ -4,13 +4,15 @@
 //! number on the line, a station's other events are numbered by this station alone. Only the order of numbers matters,
 //! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
+mod disturbed;
 mod tune;
 mod turn;
 
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
-use crate::observation::{self, Observation};
-use crate::sim::bus::{Bus, FlightId};
+use crate::observation::Observation;
+use crate::sim::bus::{Bus, Flight, FlightId};
 use crate::sim::crystal::Crystal;
+use crate::sim::cut::Cuts;
 use crate::sim::fault::Faults;
 use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{Resolution, Shaft};
@@ -20,6 +22,7 @@ use crate::sim::record::{Origin, Recorder, Stamp, Transmission};
 use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::Address;
+use disturbed::Held;
 use turn::Turning;
 
 mod alter;
@@ -46,17 +49,20 @@ pub struct Wiring {
     pub tree: Tree,
     /// The links with jitter, by index, and what each draws.
     pub jitter: Vec<(usize, LinkJitter)>,
+    /// Where cables may be cut, each place with the name of the disturbance that does it.
+    pub cuts: Vec<(String, Place)>,
 }
 
 impl Wiring {
     /// One segment of cable.
     pub fn line() -> Self {
-        Self { tree: Tree::line(), jitter: Vec::new() }
+        Self { tree: Tree::line(), jitter: Vec::new(), cuts: Vec::new() }
     }
     /// The bus of stations at `places`.
     fn bus(self, places: &[Place]) -> Bus {
         let (unsteady, jitter): (Vec<_>, Vec<_>) = self.jitter.into_iter().unzip();
-        Bus::new(Delays::new(&self.tree, places, &unsteady), jitter)
+        let cuts = Cuts::new(self.cuts, &self.tree, places);
+        Bus::new(Delays::new(&self.tree, places, &unsteady), jitter).with_cuts(cuts)
     }
 }
 
@@ -106,6 +112,8 @@ enum Event {
     Broadcast(FlightId, u8),
     Sent,
     Deadline(u8),
+    /// A telegram that a disturbance has held up, or made, leaves.
+    Held(u16),
     /// A disturbance of this number among those that turn does so.
     Turn(u16),
     /// A disturbance of this number among those that turn changes rates of crystals.
@@ -162,6 +170,7 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     queue: Q,
     jitter: JitterSource,
     faults: Faults,
+    held: Held,
     acts: Vec<(usize, Act<S::Command>)>,
     /// Which of them do not count any more.
     cancelled: core::ops::Range<usize>,
@@ -229,6 +238,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             queue: Q::default(),
             jitter,
             faults,
+            held: Held::default(),
             acts: Vec::new(),
             cancelled: 0..0,
             cycle_acts: Vec::new(),
@@ -309,6 +319,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
             Event::Sent => self.sent(slot, recorder),
             Event::Deadline(which) => self.deadline(slot, usize::from(which), recorder),
+            Event::Held(which) => self.release(slot, usize::from(which), recorder),
             Event::Turn(number) => self.turn(number.into(), recorder),
             Event::Step(number) => self.step_crystals(number.into()),
         }
@@ -370,9 +381,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let sample = if station.sample_with_telegrams { self.raw(slot) } else { 0 };
         let now = self.local(slot);
         // Without octets it was cut off before it began.
-        if station.powered && !self.bus.flight(id).frame.is_empty() && !self.is_deaf(slot) {
+        if station.powered && !self.bus.flight(id).frame.is_empty() && self.hears(slot, id) {
             self.out.clear();
-            let octets = self.bus.flight(id).frame.octets();
+            let flight = self.bus.flight(id);
+            let octets = if flight.broken { &[] } else { flight.frame.octets() };
             let input = Input::Telegram(Heard { octets, sample });
             self.slots[slot].site.machine.step(now, input, &mut self.out);
             self.bus.heard(id);
@@ -380,6 +392,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         } else {
             self.bus.heard(id);
         }
+    }
+    /// Whether a telegram comes to a station's ears.
+    fn hears(&self, slot: usize, id: FlightId) -> bool {
+        self.bus.reaches(id, slot) && !self.is_deaf(slot)
     }
     /// Whether a disturbance keeps a station from hearing.
     fn is_deaf(&self, slot: usize) -> bool {
@@ -499,8 +515,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Puts the telegram in the outbox, if there is one, onto the line.
     fn transmit<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
         let Some((send, frame)) = self.out.sending() else { return };
-        let Slot { site, address, .. } = &self.slots[slot];
-        let address = *address;
+        let &Slot { ref site, address, .. } = &self.slots[slot];
         let mut start = site.crystal.to_true(send.at);
         let mut end = site.crystal.to_true(send.at + self.rate.octets(frame.len()));
         if send.clock {
@@ -513,23 +528,25 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             start += delay;
             end += delay;
         }
-        let running = (start, self.clocks_begun(send.clock));
-        let lost = self.faults.loses(running, address, send.clock, frame.octets());
         if send.clock {
             // The master's transmitter runs, whatever becomes of the telegram.
             self.begin_cycle(slot, end);
         }
-        if self.faults.mutes(address, running) {
+        if !self.faults.line.is_idle() {
+            return self.transmit_disturbed(slot, (start, end), send.clock, recorder);
+        }
+        if self.faults.mutes(address, (start, self.clocks_begun(send.clock))) {
             return;
         }
-        if let Some(number) = lost {
-            let how = observation::Disturbance::Lost;
-            return self.tell(slot, &Observation::Disturbed { number, how }, recorder);
-        }
         let Some((_, frame)) = self.out.sending() else { return };
-        let (octets, origin) = (frame.octets(), Origin::Sender);
-        recorder.telegram(&Transmission { start, end, sender: address, octets, origin });
-        let (id, hit) = self.bus.send(slot, (start, end), frame);
+        let flight = self.bus.send(slot, (start, end), frame, (Origin::Sender, false));
+        self.sent_off(slot, flight, recorder);
+    }
+    /// Tells that a telegram is on the line, and its listeners when its end will reach them.
+    fn sent_off<R: Recorder>(&mut self, slot: usize, (id, hit): (FlightId, Option<usize>), recorder: &mut R) {
+        let sender = self.slots[slot].address;
+        let Flight { start, end, origin, ref frame, .. } = *self.bus.flight(id);
+        recorder.telegram(&Transmission { start, end, sender, octets: frame.octets(), origin });
         if let Some(with) = hit {
             self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
         }

@@ -180,6 +180,13 @@ impl Stream {
         }
     }
 
+    /// An odd multiple of 2^-53 between 0 and 1: exact, neither of the two.
+    pub fn unit(&mut self) -> f64 {
+        /// 2^-52.
+        const STEP: f64 = 1.0 / (1u64 << 52) as f64;
+        ((self.words.next_u64() >> 12) as f64 + 0.5) * STEP
+    }
+
     /// An odd multiple of 2^-52 between -1 and 1: exact, as often negative as positive, never 0.
     fn coordinate(&mut self) -> f64 {
         /// 2^-51.

@@ -189,15 +189,16 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter.clone(), seed, master.address.get()).expect("a checked jitter");
-    let mut network = Network::new(
-        scenario.bus.params.rate,
-        (wiring(scenario), sites),
-        jitter,
-        Faults::new(&scenario.disturbances, seed),
-    );
+    let mut network = Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, faults(scenario));
     order_disturbances(&mut network, scenario);
     order(&mut network, scenario, &scenario.events);
     network
+}
+
+/// The disturbances of a scenario at work, with the draws of its seed for each of its stations.
+pub fn faults(scenario: &Scenario) -> Faults {
+    let stations: Vec<_> = scenario.stations().map(|station| station.address).collect();
+    Faults::new(&scenario.disturbances, scenario.run.seed, &stations)
 }
 
 /// Gives `network` the orders of `events`, which are events of `scenario`.
@@ -256,7 +257,11 @@ fn wiring(scenario: &Scenario) -> Wiring {
         let jitter = more.fold(own, |jitter, (disturbance, width)| jitter.with(width, seed, &disturbance.name));
         strays.then_some((index, jitter))
     });
-    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect() }
+    let cuts = scenario.disturbances.iter().filter_map(|disturbance| match disturbance.what {
+        What::Cut(place) => Some((disturbance.name.clone(), place)),
+        _ => None,
+    });
+    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect(), cuts: cuts.collect() }
 }
 
 /// Where a station is.

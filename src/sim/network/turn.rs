@@ -39,6 +39,8 @@ pub(super) enum Effect<C> {
     Supply,
     /// A link has more jitter.
     Link,
+    /// A cable is cut and whole again.
+    Cut,
     /// Crystals run at other rates.
     Crystals(Tuning),
     /// Orders to masters.
@@ -84,6 +86,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             What::Crystal(_, fault) => Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false }),
             What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
             What::Repeater(..) => Effect::Link,
+            What::Cut(_) => Effect::Cut,
             What::Line(_) | What::Station(..) | What::Clock(..) | What::Instant(..) => Effect::None,
         };
         self.turning.push(Turning { number, name, what, turns, retired: false, slots, effect });
@@ -170,6 +173,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Effect::Crystals(_) => self.turn_crystals(index, on),
             Effect::Orders { fault, .. } => self.order_burst((index, fault), on, recorder),
             Effect::Link => self.bus.disturb_link(&self.turning[index].name, on),
+            Effect::Cut => self.bus.cut(&self.turning[index].name, on, self.now),
             Effect::None | Effect::Supply => {}
         }
         self.plan_turn(index);

@@ -11,7 +11,7 @@ use super::section::Reader;
 use super::services;
 use super::topology;
 use super::tree::Place;
-use super::{Action, CodeSequence, Crystal, Extent, LineFault, Link, Run, Sample, Scenario, Slave, What, When};
+use super::{Action, CodeSequence, Crystal, Extent, LineFault, Link, Run, Sample, Scenario, Slave, What, When, Which};
 use crate::device::options::Resolution;
 use crate::sim::motion;
 use crate::study::plan::finding::{Finding, Subject};
@@ -68,6 +68,7 @@ static STAGES: &[Stage] = &[
         disturbance::application::are_slaves,
         disturbance::clock::are_crystals,
         disturbance::path::in_order,
+        disturbance::path::few_cuts,
         services::commands,
         expect::subjects,
     ]),
@@ -501,12 +502,13 @@ fn event_instants(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
-        let What::Line(LineFault::LostTelegrams { from, to, .. }) = &disturbance.what else { continue };
+        let What::Line(LineFault { which: Which { from, to, .. }, .. }) = &disturbance.what else { continue };
         for (key, station) in [("from", from), ("to", to)] {
             if let Some(address) = *station
                 && address != facts.scenario.master.address
                 && facts.scenario.class1(address).is_none()
                 && facts.scenario.slave(address).is_none()
+                && facts.scenario.class2.iter().all(|class2| class2.address != address)
             {
                 let fault = no_slave(facts, address);
                 about(reader, &format!("disturbance.{}.{key}", i + 1), &[], fault);

@@ -1,6 +1,7 @@
 //! Tests: what good files become, and what each mistake in a file is answered with.
 
 use super::*;
+use crate::sim::fault::manner::Manner;
 use crate::sim::motion::Angle;
 use crate::study::scenario::disturbance::DISTURBANCES;
 use crate::time::BitRate;
@@ -920,7 +921,8 @@ fn a_good_file_becomes_a_scenario() {
     let action = Action::HoldLifeSign { cycles: Some(2) };
     assert_eq!(scenario.events, [Event { when: When::Time(Span::from_s(1)), slaves: vec![publisher], action }]);
     let window = Window::Cycles(Bursts { from: 1_000, length: Some(1), every: Some(100), times: None });
-    let what = What::Line(LineFault::MissingClocks);
+    let which = Which::all(Service::Only(crate::sim::fault::which::Kind::Synch));
+    let what = What::Line(LineFault { which, manner: Manner::All, effect: Effect::Lost });
     assert_eq!(scenario.disturbances, [Disturbance { name: "missing-clocks".to_owned(), window, what }]);
     assert_eq!(scenario.record.tables, [CsvTable::Cycles, CsvTable::Slaves, CsvTable::Events]);
     assert!(scenario.publishes(publisher) && !scenario.publishes(subscriber));
@@ -1004,12 +1006,22 @@ fn every_kind_can_be_read() {
     }
 }
 
+/// The same network in two halls.
+fn with_a_repeater(text: &str) -> String {
+    let halls = "[[segment]]\nname = \"hall 1\"\ncable = \"50 m\"\n[[segment]]\nname = \"hall 2\"\ncable = \"50 m\"\n\
+                 [[repeater]]\nfrom = \"hall 1\"\nto = \"hall 2\"\n";
+    let text =
+        text.replace("cable = \"100 m\"\n", halls).replace("address = 2\n", "address = 2\nsegment = \"hall 1\"\n");
+    text.replace("\ndevice =", "\nsegment = \"hall 2\"\ndevice =")
+}
+
 #[test]
 fn every_disturbance_can_be_written_as_its_example_says() {
     let end = GOOD.find("[[disturbance]]").unwrap();
     let rest = &GOOD[GOOD.find("[record]").unwrap()..];
     for kind in DISTURBANCES {
         let text = format!("disturbance = [{{ {} }}]\n{}{rest}", kind.example, &GOOD[..end]);
+        let text = if kind.keys.iter().any(|key| key.name == "repeater") { with_a_repeater(&text) } else { text };
         let scenario = parse(&text, &[]).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(scenario.disturbances[0].name, kind.name);
         let unread = kind.keys.iter().filter(|key| key.name.contains(' ')).count();

@@ -12,7 +12,6 @@
 //! ```
 
 use crate::device::node::Node;
-use crate::sim::fault::Faults;
 use crate::sim::motion::Shaft;
 use crate::sim::network::{Network, NetworkEvent};
 use crate::sim::queue::Queue;
@@ -48,12 +47,12 @@ fn in_the_old_world(original: &Scenario, altered: &Scenario) -> Scenario {
 
 /// Whether a network of `original` that runs can become one of `altered`.
 pub(super) fn can_change(original: &Scenario, altered: &Scenario) -> bool {
-    // What a repeater may add is part of its path.
+    // What a repeater may add, and where a cable may be cut, is part of the paths.
     let paths = |scenario: &Scenario| -> Vec<Disturbance> {
         scenario
             .disturbances
             .iter()
-            .filter(|disturbance| matches!(disturbance.what, What::Repeater(..)))
+            .filter(|disturbance| matches!(disturbance.what, What::Repeater(..) | What::Cut(_)))
             .cloned()
             .collect()
     };
@@ -86,7 +85,7 @@ pub(super) fn change_line<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>
         network.change_jitter(altered.master.gc_jitter.clone()).expect("a checked jitter");
     }
     if altered.disturbances != original.disturbances {
-        network.set_faults(Faults::new(&altered.disturbances, altered.run.seed));
+        network.set_faults(build::faults(altered));
         build::order_disturbances(network, altered);
     }
 }

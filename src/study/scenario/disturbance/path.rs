@@ -2,6 +2,7 @@
 
 use super::station::{STATION, STATIONS, targets};
 use super::{DisturbanceKind, Key};
+use crate::sim::cut::Cuts;
 use crate::sim::fault::What;
 use crate::sim::fault::instant::InstantFault;
 use crate::study::plan::rules::Facts;
@@ -9,6 +10,7 @@ use crate::study::quantity::span;
 use crate::study::scenario::check::about;
 use crate::study::scenario::error::Fault;
 use crate::study::scenario::section::{Reader, Section, instant, quantity, suggestion, text};
+use crate::study::scenario::topology::{Point, cable, station_segment};
 use crate::study::scenario::tree::Node;
 use crate::time::Span;
 
@@ -19,7 +21,7 @@ pub(super) const RECEIVER_JITTER: DisturbanceKind = DisturbanceKind {
     name: "receiver-jitter",
     what: "these stations capture the end of each telegram early or late, equally likely within the half width",
     keys: &[STATION, STATIONS, HALF_WIDTH],
-    example: r#"kind = "receiver-jitter", stations = "all slaves", half_width = "100 ns", at = "1 s", for = "2 s""#,
+    example: r#"kind = "receiver-jitter", stations = "all slaves", half_width = "100 ns", at = "1 s""#,
     read: |section, reader| {
         let half_width = section.required(reader, "half_width", "\"100 ns\"", instant);
         let stations = targets(section, reader);
@@ -71,13 +73,48 @@ pub(super) const REPEATER_JITTER: DisturbanceKind = DisturbanceKind {
         },
         HALF_WIDTH,
     ],
-    example: r#"kind = "repeater-jitter", repeater = "hall 1 - hall 2", half_width = "50 ns", at = "1 s", for = "2 s""#,
+    example: r#"kind = "repeater-jitter", repeater = "hall 1 - hall 2", half_width = "50 ns", at = "1 s""#,
     read: |section, reader| {
         let repeater = repeater(section, reader);
         let half_width = section.required(reader, "half_width", "\"50 ns\"", instant);
         Some(What::Repeater(repeater?, half_width?))
     },
 };
+
+/// A cable is cut.
+pub(super) const CABLE_CUT: DisturbanceKind = DisturbanceKind {
+    name: "cable-cut",
+    what: "a cable is cut: both parts of the network go on by themselves and know nothing of each other",
+    keys: &[
+        Key { name: "segment", unit: "name", default: "the only one", what: "whose cable is cut" },
+        Key { name: "position", unit: "length", default: "-", what: "where, from the beginning of the cable" },
+    ],
+    example: r#"kind = "cable-cut", position = "40 m", at = "1 s", for = "500 ms""#,
+    read: |section, reader| {
+        let topology = reader.around.topology.clone();
+        let segment = station_segment(section, reader, topology.as_ref());
+        let length = topology.as_ref().map_or(0, |topology| topology.segments()[usize::from(segment)].cable_mm);
+        let inside = |node: &Node| match cable(node)? {
+            0 => Err(Fault::new("the beginning of a cable parts nothing").help("position = \"1 m\" or more")),
+            mm if mm >= length => {
+                Err(Fault::new(format!("this cable is {} m long", length as f64 / 1e3)).help("a place before its end"))
+            }
+            mm => Ok(mm),
+        };
+        let mm = section.required(reader, "position", "\"40 m\"", inside)?;
+        Some(What::Cut(topology?.place(Point { segment, mm })))
+    },
+};
+
+/// Not more cables are cut than the network can tell apart.
+pub(in crate::study::scenario) fn few_cuts(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let all = facts.scenario.disturbances.iter().enumerate();
+    let mut cuts = all.filter(|(_, disturbance)| matches!(disturbance.what, What::Cut(_)));
+    if let Some((i, _)) = cuts.nth(Cuts::MAX) {
+        let fault = Fault::new("too many cuts").rule(format!("at most {} places (Model)", Cuts::MAX));
+        about(reader, &format!("disturbance.{}.position", i + 1), &[], fault);
+    }
+}
 
 /// The repeater that is meant, by its index.
 fn repeater(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<usize> {
