@@ -38,6 +38,10 @@ pub(super) enum Effect<C> {
     None,
     /// The supply goes off and on.
     Supply,
+    /// A link has more jitter.
+    Link,
+    /// A cable is cut and whole again.
+    Cut,
     /// Crystals run at other rates.
     Crystals(Tuning),
     /// Something comes onto the line.
@@ -88,7 +92,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             What::Station(_, StationFault::Restart) => Effect::Supply,
             What::Crystal(_, fault) => Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false }),
             What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
-            What::Line(_) | What::Source(_) | What::Station(..) | What::Clock(..) => {
+            What::Repeater(..) => Effect::Link,
+            What::Cut(_) => Effect::Cut,
+            What::Line(_) | What::Source(_) | What::Station(..) | What::Clock(..) | What::Instant(..) => {
                 source.map_or(Effect::None, Effect::Source)
             }
         };
@@ -176,6 +182,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Effect::Crystals(_) => self.turn_crystals(index, on),
             Effect::Orders { fault, .. } => self.order_burst((index, fault), on, recorder),
             Effect::Source(_) if on => self.start_source(index),
+            Effect::Link => self.bus.disturb_link(&self.turning[index].name, on),
+            Effect::Cut => self.bus.cut(&self.turning[index].name, on, self.now),
             Effect::Source(_) | Effect::None | Effect::Supply => {}
         }
         self.plan_turn(index);
