@@ -79,10 +79,11 @@ pub enum RunError {
 }
 
 /// Speeds of the shafts of a scenario.
-struct Speeds(Vec<Option<(Shaft, f64)>>);
+#[derive(Clone, Debug)]
+pub(super) struct Speeds(Vec<Option<(Shaft, f64)>>);
 
 impl Speeds {
-    fn of(scenario: &Scenario) -> Self {
+    pub(super) fn of(scenario: &Scenario) -> Self {
         let mut speeds = vec![None; 128];
         for slave in &scenario.slaves {
             let counts = slave.scaling.map_or(slave.resolution().steps_per_rev, |scaling| scaling.units_per_rev);
@@ -282,7 +283,8 @@ fn masters(scenario: &Scenario) -> Vec<MasterLayout> {
     class1.chain(class2).collect()
 }
 
-fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
+/// What pictures say about a run of `scenario`.
+pub(super) fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
     PlotMeta {
         cycle: scenario.cycle_symbol(),
         scenario: scenario.name.clone(),
