@@ -3,6 +3,7 @@
 //!
 //! `ISODP_SWARM_CASES` says how many networks, `ISODP_SWARM_SEED` the seed of the first one; the next has the next seed.
 
+mod disturbance;
 mod draw;
 mod scenario;
 
@@ -21,6 +22,7 @@ use isodp::sim::record::{Recorder, Stamp, Transmission};
 use isodp::study::count::Counts;
 use isodp::study::metric::Metrics;
 use isodp::study::row::{CycleRow, Sink};
+use isodp::study::scenario::disturbance::DISTURBANCES;
 use isodp::study::scenario::{Extent, Scenario};
 use isodp::study::{build, run};
 use isodp::time::{Local, Span, Time};
@@ -269,6 +271,13 @@ fn try_seed(seed: u64) -> Tried {
         (true, true) => Tried::Endless,
         (false, true) => Tried::Well,
     }
+}
+
+#[test]
+fn every_kind_of_disturbance_is_drawn() {
+    let drawn: Vec<_> = disturbance::KINDS.iter().map(|&(kind, _)| kind).collect();
+    let known: Vec<_> = DISTURBANCES.iter().map(|kind| kind.name).collect();
+    assert_eq!(drawn, known);
 }
 
 #[test]
