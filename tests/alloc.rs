@@ -75,6 +75,26 @@ fn a_fault_and_its_acknowledgement_allocate_nothing() {
 }
 
 #[test]
+fn disturbances_of_the_line_allocate_nothing() {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/two-masters.toml"));
+    let mut text = text.expect("a scenario").replace("cycles = 1000", "cycles = 3000");
+    for keys in [
+        "kind = \"lost-telegrams\"\nrate = \"1 %\"\nservice = \"data-exchange\"",
+        "kind = \"lost-telegrams\"\npattern = \"x...............\"\nservice = \"fdl-status\"",
+        "kind = \"missing-clocks\"\nrate = \"1 %\"",
+        "kind = \"late-telegrams\"\nup_to = \"2 us\"\nservice = \"replies\"",
+        "kind = \"duplicate-telegrams\"\nrate = \"5 %\"\nservice = \"replies\"",
+        "kind = \"bit-errors\"\nrate = \"1e-5\"",
+        "kind = \"wrong-octet\"\noctet = 8\nflip = 3\nrate = \"1 %\"\nto = 4",
+    ] {
+        text += "\n[[disturbance]]\n";
+        text += keys;
+    }
+    let disturbed = Scenario::parse("line", "line.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
+}
+
+#[test]
 fn a_token_that_goes_round_allocates_nothing() {
     for set in [("bus.gap_factor", "20"), ("bus.gap_factor", "1"), ("bus.t_tr", "300000 tbit")] {
         assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("two-masters", &[set])), 0, "{set:?}");
@@ -91,4 +111,19 @@ fn links_in_both_tables_and_a_lost_publisher_allocate_nothing() {
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-network", &[])), 0);
     let sets = [("run.duration", "5 s"), ("event.1.at", "2.2 s"), ("event.2.at", "4.5 s")];
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-lost-publisher", &sets)), 0);
+}
+
+/// Every kind of a disturbance that begins and ends, several of them again and again.
+#[test]
+fn disturbances_of_stations_allocate_nothing() {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/reference.toml"));
+    let text = text.expect("a scenario")
+        + "\n[[disturbance]]\nkind = \"silent\"\nstation = 3\ncycle = 500\nfor = 1\nevery = 50\n\
+           [[disturbance]]\nkind = \"deaf\"\nstation = 4\ncycle = 510\nfor = 1\nevery = 50\n\
+           [[disturbance]]\nkind = \"crystal-wander\"\nstations = \"all slaves\"\nstep = \"10 ppb\"\ninterval = \"1 ms\"\nbound = \"2 ppm\"\n\
+           [[disturbance]]\nkind = \"temperature-step\"\nstation = 2\noffset = \"9 ppm\"\ntime_constant = \"1 s\"\ncycle = 500\nfor = 200\nevery = 400\n\
+           [[disturbance]]\nkind = \"hold-life-sign\"\nstation = 5\ncycle = 520\nfor = 1\nevery = 50\n";
+    let disturbed = Scenario::parse("disturbed", "disturbed", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
+    assert_eq!(allocations::<HeapQueue<NetworkEvent>>(&disturbed), 0);
 }

@@ -4,6 +4,7 @@
 //! telegram draws once from that link's stream, however many listen: whoever is behind the link hears the same.
 
 use crate::sim::noise::LinkJitter;
+use crate::sim::record::Origin;
 use crate::sim::topology::Delays;
 use crate::time::{Span, Time};
 use crate::wire::Frame;
@@ -23,6 +24,10 @@ pub struct Flight {
     strays: Vec<Span>,
     /// The characters.
     pub frame: Frame,
+    /// How it came onto the line.
+    pub origin: Origin,
+    /// A character of it is broken, so that every receiver drops it and only knows that something was on the line.
+    pub broken: bool,
     /// Listeners that have not heard its end yet.
     listeners: u16,
 }
@@ -32,7 +37,7 @@ pub struct Flight {
 pub struct FlightId(u16);
 
 /// Telegrams kept for telling whether the line is busy somewhere: more are never near each other.
-const RECENT: usize = 4;
+const RECENT: usize = 8;
 
 /// When a telegram was on the line at its sender.
 #[derive(Clone, Debug)]
@@ -55,10 +60,8 @@ pub struct Bus {
     sent: u64,
     /// The telegrams sent last, each at the place of its number.
     recent: Vec<Sent>,
-    last: Option<FlightId>,
-    /// End and sender of the telegram that ends last of all.
+    /// End of the telegram that ends last of all.
     busy_until: Time,
-    busy_by: usize,
 }
 
 impl Bus {
@@ -71,9 +74,7 @@ impl Bus {
             free: Vec::new(),
             sent: 0,
             recent: Vec::new(),
-            last: None,
             busy_until: Time::ZERO,
-            busy_by: 0,
         }
     }
     /// The delays between the stations.
@@ -81,36 +82,51 @@ impl Bus {
         &self.delays
     }
 
-    /// Puts a telegram on the line. Returns its name, and the station it overlaps with, if any.
-    pub fn send(&mut self, sender: usize, (start, end): (Time, Time), frame: &Frame) -> (FlightId, Option<usize>) {
+    /// Puts a telegram of `sender` on the line; `broken` tells that a character of it is. Returns its name, and the station
+    /// it overlaps with, if any.
+    pub fn send(
+        &mut self,
+        sender: usize,
+        (start, end): (Time, Time),
+        frame: &Frame,
+        (origin, broken): (Origin, bool),
+    ) -> (FlightId, Option<usize>) {
         let id = self.free.pop().unwrap_or_else(|| {
             let (strays, frame) = (Vec::new(), Frame::new());
-            self.flights.push(Flight { start, end, sender, number: 0, strays, frame, listeners: 0 });
+            let flight = Flight { start, end, sender, number: 0, strays, frame, origin, broken, listeners: 0 };
+            self.flights.push(flight);
             FlightId(self.flights.len() as u16 - 1)
         });
         let flight = &mut self.flights[usize::from(id.0)];
         flight.frame.copy_from(frame);
         (flight.start, flight.end, flight.sender, flight.listeners) = (start, end, sender, 0);
+        (flight.origin, flight.broken) = (origin, broken);
         flight.number = self.sent;
         if !self.jitter.is_empty() {
             flight.strays.clear();
             flight.strays.extend(self.jitter.iter_mut().map(LinkJitter::draw));
         }
+        let hit = if start < self.busy_until { self.collide(id) } else { None };
         self.remember(id);
         self.sent += 1;
-
-        let hit = (start < self.busy_until).then_some(self.busy_by);
-        if hit.is_some() {
-            self.garble(id);
-            if let Some(last) = self.last.filter(|last| !self.free.contains(last)) {
-                self.garble(last);
-            }
-        }
-        if end > self.busy_until {
-            (self.busy_until, self.busy_by) = (end, sender);
-        }
-        self.last = Some(id);
+        self.busy_until = self.busy_until.max(end);
         (id, hit)
+    }
+    /// Overlapping characters fail their parity, and so receivers drop all telegrams that overlap with this one. Returns
+    /// the sender of one of them, the one that ends last.
+    #[cold]
+    fn collide(&mut self, id: FlightId) -> Option<usize> {
+        let Flight { start, end, .. } = self.flights[usize::from(id.0)];
+        let overlaps = |(from, to): (Time, Time)| from < to && start < to && from < end;
+        // What listeners wait for, however long ago it was sent.
+        for other in self.flights.iter_mut().filter(|other| other.listeners > 0 && !other.frame.is_empty()) {
+            other.broken |= overlaps((other.start, other.end));
+        }
+        // One that was cut off before it began is as long as nothing.
+        let others = self.recent.iter().filter(|sent| overlaps((sent.start, sent.end)));
+        let hit = others.max_by_key(|sent| sent.end).map(|sent| sent.sender);
+        self.flights[usize::from(id.0)].broken |= hit.is_some();
+        hit
     }
     /// Keeps the telegram for [`Self::is_busy`] instead of the oldest kept.
     fn remember(&mut self, id: FlightId) {
@@ -125,13 +141,6 @@ impl Bus {
             None => self.recent.push(Sent { start, end, sender, strays: strays.clone() }),
         }
     }
-    /// Overlapping characters fail their parity: the receiver sees a telegram that does not end as it should.
-    fn garble(&mut self, id: FlightId) {
-        if let Some(octet) = self.flights[usize::from(id.0)].frame.octets_mut().last_mut() {
-            *octet ^= 0xFF;
-        }
-    }
-
     /// The station `sender` lost its supply at `now`: what it would have sent later never reaches the line. What is
     /// under way is finished (Model: a telegram that breaks off would be dropped all the same).
     pub fn silence(&mut self, sender: usize, now: Time) {
@@ -143,9 +152,6 @@ impl Bus {
         }
         for sent in self.recent.iter_mut().filter(|sent| coming(sent.sender, sent.start)) {
             sent.end = sent.start;
-            if self.busy_by == sender {
-                self.busy_until = self.busy_until.min(now);
-            }
         }
     }
 
@@ -200,6 +206,8 @@ mod tests {
     use crate::sim::topology::{CABLE_DELAY, Link, Place, Tree, cable_delay};
     use crate::wire::Address;
 
+    const GOOD: (Origin, bool) = (Origin::Sender, false);
+
     fn token() -> Frame {
         let mut frame = Frame::new();
         frame.set_token(Address::new(2).unwrap(), Address::new(2).unwrap());
@@ -218,47 +226,63 @@ mod tests {
     #[test]
     fn telegrams_that_overlap_are_both_garbled_and_those_that_follow_are_not() {
         let mut bus = line();
-        let (a, clean) = bus.send(0, (ns(0), ns(100)), &token());
+        let (a, clean) = bus.send(0, (ns(0), ns(100)), &token(), GOOD);
         bus.add_listeners(a, 1);
-        let (b, hit) = bus.send(1, (ns(99), ns(199)), &token());
+        let (b, hit) = bus.send(1, (ns(99), ns(199)), &token(), GOOD);
         bus.add_listeners(b, 1);
         assert_eq!((clean, hit), (None, Some(0)));
         for id in [a, b] {
-            assert!(bus.flight(id).frame.octets() != token().octets());
+            assert!(bus.flight(id).broken);
             bus.heard(id);
         }
-        let (c, hit) = bus.send(0, (ns(199), ns(299)), &token());
-        assert_eq!((hit, bus.flight(c).frame.octets()), (None, token().octets()));
+        let (c, hit) = bus.send(0, (ns(199), ns(299)), &token(), GOOD);
+        assert_eq!((hit, bus.flight(c).broken), (None, false));
+    }
+
+    #[test]
+    fn a_telegram_that_is_hit_twice_is_as_broken_and_one_that_fits_before_another_is_not_hit() {
+        let mut bus = line();
+        let mut put = |sender, from, to| {
+            let (id, hit) = bus.send(sender, (ns(from), ns(to)), &token(), GOOD);
+            bus.add_listeners(id, 1);
+            (id, hit)
+        };
+        let sent = [put(0, 0, 100), put(1, 50, 150), put(0, 120, 220), put(1, 1_000, 1_100), put(0, 500, 1_000)];
+        assert_eq!(sent.map(|(_, hit)| hit), [None, Some(0), Some(1), None, None]);
+        let long = put(0, 900, 2_000);
+        assert_eq!(long.1, Some(1));
+        let all = sent.map(|(id, _)| bus.flight(id).broken);
+        assert_eq!(all, [true, true, true, true, true], "the last two by the long one");
     }
 
     #[test]
     fn what_a_station_without_supply_had_planned_never_comes() {
         let mut bus = line();
-        let (running, _) = bus.send(0, (ns(0), ns(100)), &token());
+        let (running, _) = bus.send(0, (ns(0), ns(100)), &token(), GOOD);
         bus.add_listeners(running, 1);
         bus.silence(0, ns(50));
         assert_eq!(bus.flight(running).frame.octets(), token().octets(), "under way, it is finished");
         bus.heard(running);
-        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token());
+        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token(), GOOD);
         bus.add_listeners(planned, 1);
         bus.silence(1, ns(300));
         assert!(!bus.flight(planned).frame.is_empty(), "another station's supply");
         bus.silence(0, ns(300));
         assert!(bus.flight(planned).frame.is_empty());
         assert!(!bus.is_busy(ns(550), 0), "the line stays free");
-        let (_, hit) = bus.send(1, (ns(550), ns(650)), &token());
+        let (_, hit) = bus.send(1, (ns(550), ns(650)), &token(), GOOD);
         assert_eq!(hit, None);
     }
 
     #[test]
     fn a_receiver_sees_the_line_busy_one_delay_later() {
         let mut bus = line();
-        let (id, _) = bus.send(0, (ns(100), ns(200)), &token());
+        let (id, _) = bus.send(0, (ns(100), ns(200)), &token(), GOOD);
         assert_eq!([149, 150, 249, 250].map(|t| bus.is_busy(ns(t), 1)), [false, true, true, false]);
         assert_eq!((bus.arrival(id, 0), bus.arrival(id, 1)), ((ns(200), 0), (ns(250), 0)));
         // Forgotten when as many as are kept have followed.
         for _ in 0..RECENT {
-            bus.send(1, (ns(1_000), ns(1_100)), &token());
+            bus.send(1, (ns(1_000), ns(1_100)), &token(), GOOD);
         }
         assert!(!bus.is_busy(ns(150), 1) && bus.is_busy(ns(1_050), 1) && bus.is_busy(ns(1_149), 0));
     }
@@ -274,7 +298,7 @@ mod tests {
         let mut strays = Vec::new();
         for sender in [0, 1, 2].into_iter().cycle().take(300) {
             let start = ns(strays.len() as i64 * 1_000);
-            let (id, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token());
+            let (id, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token(), GOOD);
             let delay = |listener| bus.arrival(id, listener).0 - bus.flight(id).end;
             let stray = expected.draw();
             let behind = Span::from_ns(100) + stray;

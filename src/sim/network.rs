@@ -4,18 +4,25 @@
 //! number on the line, a station's other events are numbered by this station alone. Only the order of numbers matters,
 //! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
+mod disturbed;
+mod tune;
+mod turn;
+
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
-use crate::observation::{self, Observation};
-use crate::sim::bus::{Bus, FlightId};
+use crate::observation::Observation;
+use crate::sim::bus::{Bus, Flight, FlightId};
 use crate::sim::crystal::Crystal;
 use crate::sim::fault::Faults;
+use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{Resolution, Shaft};
-use crate::sim::noise::{JitterSource, LinkJitter};
+use crate::sim::noise::LinkJitter;
 use crate::sim::queue::{Key, NearQueue, Phase, Queue};
 use crate::sim::record::{Origin, Recorder, Stamp, Transmission};
 use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::Address;
+use disturbed::Held;
+use turn::Turning;
 
 mod alter;
 
@@ -101,6 +108,31 @@ enum Event {
     Broadcast(FlightId, u8),
     Sent,
     Deadline(u8),
+    /// A telegram that a disturbance has held up, or made, leaves.
+    Held(u16),
+    /// A disturbance of this number among those that turn does so.
+    Turn(u16),
+    /// A disturbance of this number among those that turn changes rates of crystals.
+    Step(u16),
+}
+
+/// What a station's supply depends on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Supply {
+    /// Its switch is on.
+    switched_on: bool,
+    /// Disturbances that keep it off.
+    outages: u16,
+}
+
+/// How fast a station's crystal should be (parts per billion).
+#[derive(Clone, Copy, Debug)]
+struct Offset {
+    own: i64,
+    /// What disturbances add.
+    pulled: i64,
+    /// It is not in force yet.
+    waits: bool,
 }
 
 #[derive(Clone)]
@@ -109,6 +141,8 @@ struct Slot<S> {
     address: Address,
     filter: Filter,
     powered: bool,
+    supply: Supply,
+    offset: Offset,
     /// When its next cycle begins, once that is known.
     cycle_at: Option<Time>,
     sample_with_telegrams: bool,
@@ -132,12 +166,16 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     queue: Q,
     jitter: JitterSource,
     faults: Faults,
+    held: Held,
     acts: Vec<(usize, Act<S::Command>)>,
     /// Which of them do not count any more.
     cancelled: core::ops::Range<usize>,
     /// Acts bound to cycles, by cycle.
     cycle_acts: Vec<(u64, usize)>,
     next_cycle_act: usize,
+    /// Disturbances that begin and end, and the first cycle in which one of them does.
+    turning: Vec<Turning<S::Command>>,
+    next_turn: u64,
     now: Time,
     /// Cycles that the first station has begun, with a lost SYNCH too.
     clocks: u64,
@@ -157,7 +195,12 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     ///
     /// # Panics
     /// If two stations have one address, or there are more than 127: the caller checks scenarios.
-    pub fn new(rate: BitRate, (wiring, sites): (Wiring, Vec<Site<S>>), jitter: JitterSource, faults: Faults) -> Self {
+    pub fn new(
+        rate: BitRate,
+        (wiring, sites): (Wiring, Vec<Site<S>>),
+        jitter: JitterSource,
+        mut faults: Faults,
+    ) -> Self {
         let places: Vec<_> = sites.iter().map(|site| site.place).collect();
         let mut by_address = [None; 128];
         let mut slots = Vec::with_capacity(sites.len());
@@ -166,18 +209,21 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let place = &mut by_address[usize::from(address.get())];
             assert!(place.is_none(), "two stations with address {address}");
             *place = Some(index as u8);
-            let filter = site.machine.filter();
+            let (filter, own) = (site.machine.filter(), site.crystal.ppb());
             slots.push(Slot {
                 site,
                 address,
                 filter,
                 powered: false,
+                supply: Supply::default(),
+                offset: Offset { own, pulled: 0, waits: false },
                 cycle_at: None,
                 sample_with_telegrams: false,
                 deadlines: [Deadline::default(); Outbox::DEADLINES],
                 number: 0,
             });
         }
+        let turning = faults.take_turning();
         let mut network = Self {
             rate,
             slots,
@@ -188,10 +234,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             queue: Q::default(),
             jitter,
             faults,
+            held: Held::default(),
             acts: Vec::new(),
             cancelled: 0..0,
             cycle_acts: Vec::new(),
             next_cycle_act: 0,
+            turning: Vec::new(),
+            next_turn: u64::MAX,
             now: Time::ZERO,
             clocks: 0,
             out: Outbox::new(),
@@ -202,6 +251,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let (address, at) = (network.slots[index].address, network.slots[index].site.powered_at);
             network.order(When::Time(at), address, Act::PowerOn);
         }
+        network.disturb(turning);
         network
     }
 
@@ -265,6 +315,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
             Event::Sent => self.sent(slot, recorder),
             Event::Deadline(which) => self.deadline(slot, usize::from(which), recorder),
+            Event::Held(which) => self.release(slot, usize::from(which), recorder),
+            Event::Turn(number) => self.turn(number.into(), recorder),
+            Event::Step(number) => self.step_crystals(number.into()),
         }
         true
     }
@@ -272,24 +325,43 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     fn act<R: Recorder>(&mut self, act: usize, recorder: &mut R) {
         let (slot, act) = self.acts[act];
         match act {
-            Act::PowerOn if !self.slots[slot].powered => {
-                self.slots[slot].powered = true;
-                self.tell(slot, &Observation::Power { on: true }, recorder);
-                self.step(slot, self.local(slot), Input::PowerOn, recorder);
-            }
-            Act::PowerOn => {}
-            Act::PowerOff => {
-                self.tell(slot, &Observation::Power { on: false }, recorder);
-                let (index, slot) = (slot, &mut self.slots[slot]);
-                slot.powered = false;
-                slot.cycle_at = None;
-                for deadline in &mut slot.deadlines {
-                    deadline.due = None;
-                }
-                self.bus.silence(index, self.now);
-            }
-            Act::Command(command) => self.step(slot, self.local(slot), Input::Command(command), recorder),
+            Act::PowerOn => self.switch(slot, true, recorder),
+            Act::PowerOff => self.switch(slot, false, recorder),
+            Act::Command(command) => self.command(slot, command, recorder),
         }
+    }
+    fn command<R: Recorder>(&mut self, slot: usize, command: S::Command, recorder: &mut R) {
+        if self.slots[slot].powered {
+            self.step(slot, self.local(slot), Input::Command(command), recorder);
+        } else {
+            self.tell(slot, &Observation::OrderLost, recorder);
+        }
+    }
+    fn switch<R: Recorder>(&mut self, slot: usize, on: bool, recorder: &mut R) {
+        self.slots[slot].supply.switched_on = on;
+        self.update_supply(slot, recorder);
+    }
+    /// Brings a station's supply to what its switch and the disturbances make of it.
+    fn update_supply<R: Recorder>(&mut self, index: usize, recorder: &mut R) {
+        let slot = &mut self.slots[index];
+        let on = slot.supply.switched_on && slot.supply.outages == 0;
+        if on == slot.powered {
+            return;
+        }
+        slot.powered = on;
+        if on {
+            self.tell(index, &Observation::Power { on }, recorder);
+            return self.step(index, self.local(index), Input::PowerOn, recorder);
+        }
+        slot.cycle_at = None;
+        for deadline in &mut slot.deadlines {
+            deadline.due = None;
+        }
+        if slot.offset.waits {
+            self.tune(index);
+        }
+        self.bus.silence(index, self.now);
+        self.tell(index, &Observation::Power { on }, recorder);
     }
     /// Tells what happened to a station and was not its own doing.
     fn tell<R: Recorder>(&self, slot: usize, what: &Observation, recorder: &mut R) {
@@ -305,9 +377,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let sample = if station.sample_with_telegrams { self.raw(slot) } else { 0 };
         let now = self.local(slot);
         // Without octets it was cut off before it began.
-        if station.powered && !self.bus.flight(id).frame.is_empty() {
+        if station.powered && !self.bus.flight(id).frame.is_empty() && !self.is_deaf(slot) {
             self.out.clear();
-            let octets = self.bus.flight(id).frame.octets();
+            let flight = self.bus.flight(id);
+            let octets = if flight.broken { &[] } else { flight.frame.octets() };
             let input = Input::Telegram(Heard { octets, sample });
             self.slots[slot].site.machine.step(now, input, &mut self.out);
             self.bus.heard(id);
@@ -315,6 +388,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         } else {
             self.bus.heard(id);
         }
+    }
+    /// Whether a disturbance keeps a station from hearing.
+    fn is_deaf(&self, slot: usize) -> bool {
+        self.faults.deafens(self.slots[slot].address, (self.now, self.clocks_begun(false)))
     }
     /// The shaft's raw position now (steps); zero without a shaft.
     fn raw(&self, slot: usize) -> u32 {
@@ -326,11 +403,17 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         if self.slots[slot].cycle_at.take_if(|at| *at == self.now).is_none() {
             return; // It lost its supply before.
         }
+        if self.slots[slot].offset.waits {
+            self.tune(slot);
+        }
         if slot != Self::CLOCK {
             return self.step(slot, self.local(slot), Input::Sent, recorder);
         }
         let cycle = self.clocks;
         self.clocks += 1;
+        if cycle >= self.next_turn {
+            self.turn_in_cycle(cycle, recorder);
+        }
         while let Some(&(_, act)) = self.cycle_acts.get(self.next_cycle_act).filter(|&&(due, _)| due <= cycle) {
             self.next_cycle_act += 1;
             self.act(act, recorder);
@@ -352,10 +435,15 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         deadline.due = None;
         let input = match Timer::ALL.get(which) {
-            Some(&timer) => Input::Deadline { timer, busy: timer == Timer::Slot && self.bus.is_busy(now, slot) },
+            Some(&timer) => Input::Deadline { timer, busy: timer == Timer::Slot && self.is_busy(slot) },
             None => Input::Sample(self.raw(slot)),
         };
         self.step(slot, local, input, recorder);
+    }
+
+    /// Whether a station sees characters on the line.
+    fn is_busy(&self, slot: usize) -> bool {
+        self.bus.is_busy(self.now, slot) && !self.is_deaf(slot)
     }
 
     fn step<R: Recorder>(&mut self, slot: usize, now: Local, input: Input<'_, S::Command>, recorder: &mut R) {
@@ -419,29 +507,34 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Puts the telegram in the outbox, if there is one, onto the line.
     fn transmit<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
         let Some((send, frame)) = self.out.sending() else { return };
-        let Slot { site, address, .. } = &self.slots[slot];
-        let address = *address;
+        let &Slot { ref site, address, .. } = &self.slots[slot];
         let mut start = site.crystal.to_true(send.at);
         let mut end = site.crystal.to_true(send.at + self.rate.octets(frame.len()));
         if send.clock {
-            let jitter = self.jitter.draw().max(self.now - start);
+            let jitter = self.jitter.draw(start, self.clocks) + self.faults.clock_strays(start, self.clocks);
+            let jitter = jitter.max(self.now - start);
             start += jitter;
             end += jitter;
         }
-        let running = (start, self.clocks_begun(send.clock));
-        let lost = self.faults.loses(running, address, send.clock, frame.octets());
         if send.clock {
             // The master's transmitter runs, whatever becomes of the telegram.
             self.begin_cycle(slot, end);
         }
-        if let Some(number) = lost {
-            let how = observation::Disturbance::Lost;
-            return self.tell(slot, &Observation::Disturbed { number, how }, recorder);
+        if !self.faults.line.is_idle() {
+            return self.transmit_disturbed(slot, (start, end), send.clock, recorder);
+        }
+        if self.faults.mutes(address, (start, self.clocks_begun(send.clock))) {
+            return;
         }
         let Some((_, frame)) = self.out.sending() else { return };
-        let (octets, origin) = (frame.octets(), Origin::Sender);
-        recorder.telegram(&Transmission { start, end, sender: address, octets, origin });
-        let (id, hit) = self.bus.send(slot, (start, end), frame);
+        let flight = self.bus.send(slot, (start, end), frame, (Origin::Sender, false));
+        self.sent_off(slot, flight, recorder);
+    }
+    /// Tells that a telegram is on the line, and its listeners when its end will reach them.
+    fn sent_off<R: Recorder>(&mut self, slot: usize, (id, hit): (FlightId, Option<usize>), recorder: &mut R) {
+        let sender = self.slots[slot].address;
+        let Flight { start, end, origin, ref frame, .. } = *self.bus.flight(id);
+        recorder.telegram(&Transmission { start, end, sender, octets: frame.octets(), origin });
         if let Some(with) = hit {
             self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
         }

@@ -44,7 +44,8 @@ pub struct Stamp<'a> {
 /// Reads a run while it happens.
 pub trait Recorder {
     /// A telegram will be on the line. Comes when its sender decides so, at or before its first bit; telegrams that do
-    /// not overlap come in the order of their starts.
+    /// not overlap come in the order of their starts. What a disturbance has held up or made comes with its first bit, when
+    /// a telegram that begins a little later may have come already.
     fn telegram(&mut self, telegram: &Transmission<'_>);
     /// A station observed something.
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation);

@@ -2,6 +2,7 @@
 //! threads and reports.
 
 pub mod acyclic;
+pub mod batch;
 pub mod budget;
 pub mod build;
 pub mod count;

@@ -36,6 +36,14 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
+/// The beginning of the page and where the files are, for one of several runs.
+pub(super) fn brief(summary: &Summary, dir: Option<&str>) -> Vec<String> {
+    let mut lines = Vec::new();
+    network(summary, &mut lines);
+    files(summary, dir, &mut lines);
+    lines
+}
+
 fn network(summary: &Summary, lines: &mut Vec<String>) {
     let (network, timing, counts) = (&summary.network, &summary.timing, &summary.counts);
     lines.push(format!(

@@ -15,6 +15,7 @@ mod expect;
 #[cfg(test)]
 mod faults;
 mod gsd;
+mod jitter;
 pub mod kinds;
 mod link;
 mod options;
@@ -36,11 +37,12 @@ use crate::device::profile::Device;
 use crate::dp::handler::{Patch, StartupTelegram};
 pub use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
-pub use crate::sim::fault::line::{LineFault, Service};
+pub use crate::sim::fault::line::{Effect, LineFault};
+pub use crate::sim::fault::which::{Service, Which};
 pub use crate::sim::fault::window::{Bursts, Window};
 pub use crate::sim::fault::{Disturbance, What};
+use crate::sim::jitter::GcJitter;
 use crate::sim::motion::Motion;
-use crate::sim::noise::GcJitter;
 use crate::study::verdict::Expectation;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
@@ -321,7 +323,7 @@ impl Bus {
 }
 
 /// The master with its application.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Master {
     /// Its address, 0..=125.
     pub address: Address,

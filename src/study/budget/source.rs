@@ -1,6 +1,6 @@
 //! Sources: what makes the instant of SYNCH at an encoder differ from its prediction, and how each is switched off.
 
-use crate::sim::noise::GcJitter;
+use crate::sim::jitter::GcJitter;
 use crate::study::scenario::{Crystal, Scenario, Topology};
 use crate::time::Span;
 

@@ -431,7 +431,7 @@ const WORDS: [(&str, &[&str]); 9] = [
     ("t_dp_deviation.svg", &["T_DP deviation:", "T_DP deviation [ns]", "time [", "cycles (logarithmic)", "p99 "]),
     (
         "timeline.svg",
-        &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "telegram disturbed", "slave 3", "LED flashing"],
+        &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "disturbed", "slave 3", "LED flashing"],
     ),
     ("publish_latency.svg", &["Publish latency:", "latency [us]", "Wire:", "Publish:", "Age at use:", "p99.9"]),
     (

@@ -11,7 +11,7 @@ use super::look::{
     WIDTH, Words, counted, empty_page, lamp, legend, legend_height, page,
 };
 use crate::device::leds::Lamp;
-use crate::observation::{Leds, Observation, Phase, SlaveState};
+use crate::observation::{Disturbance, Leds, Observation, Phase, SlaveState};
 use crate::study::row::{EventRow, SlaveRow};
 
 /// Buckets of the whole run.
@@ -49,8 +49,7 @@ const MARKS: [Mark; 5] = [
     Mark { label: "fault acknowledged (lower half)", column: "ack", colour: GREEN, from: 1, to: 2 },
 ];
 /// What disturbs the network, one lane each.
-const TROUBLES: [&str; 6] =
-    ["telegram disturbed", "collision", "SYNCH late", "no answer", "sign of life held", "supply off"];
+const TROUBLES: [&str; 6] = ["disturbed", "collision", "SYNCH late", "no answer", "sign of life held", "supply off"];
 
 /// Colour and name of each phase.
 const PHASES: [(Phase, RGBColor); 5] = [
@@ -150,6 +149,7 @@ impl Timeline {
     pub(super) fn event(&mut self, slave: Option<usize>, row: &EventRow) {
         self.cycles = self.cycles.max(row.cycle + 1);
         let trouble = match row.what {
+            Observation::Disturbed { how: Disturbance::Ends, .. } => None,
             Observation::Disturbed { .. } => Some(0),
             Observation::Collision { .. } => Some(1),
             Observation::ClockLate { .. } => Some(2),

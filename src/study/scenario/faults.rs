@@ -1,6 +1,7 @@
 //! Tests: what good files become, and what each mistake in a file is answered with.
 
 use super::*;
+use crate::sim::fault::manner::Manner;
 use crate::sim::motion::Angle;
 use crate::study::scenario::disturbance::DISTURBANCES;
 use crate::time::BitRate;
@@ -920,7 +921,8 @@ fn a_good_file_becomes_a_scenario() {
     let action = Action::HoldLifeSign { cycles: Some(2) };
     assert_eq!(scenario.events, [Event { when: When::Time(Span::from_s(1)), slaves: vec![publisher], action }]);
     let window = Window::Cycles(Bursts { from: 1_000, length: Some(1), every: Some(100), times: None });
-    let what = What::Line(LineFault::MissingClocks);
+    let which = Which::all(Service::Only(crate::sim::fault::which::Kind::Synch));
+    let what = What::Line(LineFault { which, manner: Manner::All, effect: Effect::Lost });
     assert_eq!(scenario.disturbances, [Disturbance { name: "missing-clocks".to_owned(), window, what }]);
     assert_eq!(scenario.record.tables, [CsvTable::Cycles, CsvTable::Slaves, CsvTable::Events]);
     assert!(scenario.publishes(publisher) && !scenario.publishes(subscriber));
@@ -974,8 +976,8 @@ fn every_kind_can_be_read() {
         let scenario = good(&[("slave.3.motion", &table)]);
         assert!(format!("{:?}", scenario.slaves[0].motion).to_lowercase().starts_with(kind.name));
     }
-    for kind in crate::sim::noise::KINDS {
-        let values = kind.parameters.iter().map(|key| format!(", {key} = \"1 us\"")).collect::<Vec<_>>().concat();
+    for kind in crate::sim::jitter::KINDS {
+        let values = kind.keys.iter().map(|(key, example)| format!(", {key} = {example}")).collect::<Vec<_>>().concat();
         let scenario = good(&[("master.gc_jitter", &format!("{{ kind = \"{}\"{values} }}", kind.name))]);
         assert_eq!(scenario.master.gc_jitter.kind(), kind);
     }

@@ -1,0 +1,23 @@
+//! What goes wrong in a master's application: orders at the beginning and at the end of each burst.
+
+use crate::dp::handler::Patch;
+
+/// What a disturbance orders of the masters of slaves.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum OrderFault {
+    /// The sign of life for these slaves stops, and counts again at the end.
+    HoldLife,
+    /// The sign of life for these slaves goes on from this value, 0..=15, at each beginning.
+    JumpLife(u8),
+    /// One value of the sign of life for these slaves is sent for twice as long, at each beginning.
+    RepeatLife,
+    /// These slaves are started anew with a changed Set_Prm, and with the good one at the end.
+    WrongPrm(Patch),
+}
+
+impl OrderFault {
+    /// Whether the end of a disturbance takes back what another one of this kind may still want.
+    pub fn holds_with(&self, other: &Self) -> bool {
+        matches!((self, other), (Self::HoldLife, Self::HoldLife) | (Self::WrongPrm(_), Self::WrongPrm(_)))
+    }
+}

@@ -1,0 +1,228 @@
+//! Disturbances of the line in whole networks: each at full strength, and at none.
+
+use isodp::observation::{Disturbance, Observation};
+use isodp::study::scenario::Scenario;
+use isodp::time::{Span, Time};
+use isodp::wire::Address;
+
+use crate::support::{Run, address};
+
+/// An isochronous master with two encoders.
+const NETWORK: &str = r#"
+[run]
+seed = 1
+cycles = 300
+
+[bus]
+rate = "12 Mbit/s"
+
+[master]
+address = 2
+t_dp = "1 ms"
+t_i = "125 us"
+t_o = "500 us"
+t_pll_w = "1 us"
+crystal = "20 ppm"
+
+[[slave]]
+address = 3
+device = "posital-ocd-dpb1b"
+crystal = "-30 ppm"
+
+[[slave]]
+address = 4
+device = "posital-ocd-dpb1b"
+crystal = "40 ppm"
+"#;
+/// Cycles from which on everything runs.
+const RUNS: u64 = 100;
+
+fn read(disturbances: &str) -> Scenario {
+    let text = format!("{NETWORK}{disturbances}");
+    Scenario::parse("line", "line.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+/// A run with one disturbance, the keys of which are given.
+fn with(keys: &str) -> Run {
+    Run::of(&read(&format!("[[disturbance]]\n{}\n", keys.replace("; ", "\n"))))
+}
+/// How often something was done to telegrams of a station.
+fn disturbed(run: &Run, station: u8, what: Disturbance) -> usize {
+    let done = |seen: &Observation| matches!(seen, Observation::Disturbed { how, .. } if *how == what);
+    run.observations.iter().filter(|(_, who, seen)| *who == address(station) && done(seen)).count()
+}
+fn count(run: &Run, what: impl Fn(&Observation) -> bool) -> usize {
+    run.observations.iter().filter(|(_, _, seen)| what(seen)).count()
+}
+fn retries(run: &Run) -> usize {
+    count(run, |seen| matches!(seen, Observation::Retry { .. }))
+}
+fn collisions(run: &Run) -> usize {
+    count(run, |seen| matches!(seen, Observation::Collision { .. }))
+}
+/// Telegrams of a station from the cycle `RUNS` on that begin with SD2.
+fn data_telegrams(run: &Run, station: u8) -> usize {
+    let t0 = run.cycles.iter().find(|row| row.cycle == RUNS).expect("a cycle").t0;
+    let data = |&&(start, _, who, ref octets): &&(_, _, _, Vec<u8>)| {
+        start >= t0 && who == address(station) && octets[0] == 0x68
+    };
+    run.telegrams.iter().filter(data).count()
+}
+
+#[test]
+fn without_strength_nothing_changes() {
+    let clean = Run::of(&read(""));
+    for keys in [
+        "kind = \"lost-telegrams\"; rate = \"0 %\"",
+        "kind = \"lost-telegrams\"; telegrams = 0",
+        "kind = \"lost-telegrams\"; pattern = \"...\"",
+        "kind = \"lost-telegrams\"; service = \"acyclic\"",
+        "kind = \"missing-clocks\"; rate = \"0\"",
+        "kind = \"late-telegrams\"; by = \"0 us\"",
+        "kind = \"late-telegrams\"; up_to = \"0 us\"; service = \"all\"",
+        "kind = \"duplicate-telegrams\"; telegrams = 0",
+        "kind = \"bit-errors\"; rate = \"0\"",
+        "kind = \"wrong-octet\"; octet = 250",
+        "kind = \"bit-errors\"; rate = \"1\"; cycle = 1000",
+    ] {
+        let run = with(keys);
+        assert_eq!((run.fingerprint, run.stations), (clean.fingerprint, clean.stations.clone()), "{keys}");
+    }
+}
+
+#[test]
+fn every_second_reply_that_is_lost_is_repeated_once() {
+    let run = with(
+        "kind = \"lost-telegrams\"; from = 4; service = \"data-exchange\"; pattern = \"x.\"; cycle = 100; for = 50",
+    );
+    assert_eq!((disturbed(&run, 4, Disturbance::Lost), retries(&run)), (50, 50));
+    let row = run.cycles.iter().filter(|row| row.cycle >= RUNS && row.retries > 0);
+    assert_eq!(row.count(), 50);
+    let few = with(
+        "kind = \"lost-telegrams\"; from = 4; service = \"replies\"; telegrams = 1; cycle = 100; for = 20; every = 50",
+    );
+    assert_eq!((disturbed(&few, 4, Disturbance::Lost), retries(&few)), (4, 4));
+}
+
+#[test]
+fn a_share_of_the_clocks_is_missing() {
+    let run = with("kind = \"missing-clocks\"; rate = \"20 %\"; cycle = 100");
+    // 200 clocks: 40, give or take 5.7.
+    let missing = disturbed(&run, 2, Disturbance::Lost);
+    assert!((20..60).contains(&missing), "{missing}");
+    let heard =
+        run.telegrams.iter().filter(|(_, _, _, octets)| octets.len() == 13 && octets[11] != 0 && octets[7] == 58);
+    assert!(heard.count() + missing >= 300);
+    let all = with("kind = \"missing-clocks\"");
+    assert!(disturbed(&all, 2, Disturbance::Lost) >= 300);
+}
+
+#[test]
+fn a_late_reply_makes_t_dx_longer_and_one_beyond_the_slot_time_is_a_retry() {
+    let clean = Run::of(&read(""));
+    let late = with("kind = \"late-telegrams\"; from = 4; service = \"data-exchange\"; by = \"2 us\"; cycle = 100");
+    for (late, clean) in late.cycles.iter().zip(&clean.cycles).filter(|(row, _)| row.cycle > RUNS) {
+        let [late, clean] = [late, clean].map(|row| row.t_dx);
+        let Some((late, clean)) = late.zip(clean) else { continue };
+        // The reply's T_DX counts on the master's crystal.
+        assert!((late - clean - Span::from_us(2)).abs() < Span::from_ns(30), "{late} {clean}");
+    }
+    assert_eq!((retries(&late), collisions(&late)), (0, 0));
+    // T_SL of 1000 t_bit is 83 us: the reply comes when the repeated request, or the next one, is under way.
+    let lost =
+        with("kind = \"late-telegrams\"; from = 4; service = \"data-exchange\"; by = \"90 us\"; cycle = 100; for = 1");
+    assert_eq!(disturbed(&lost, 4, Disturbance::Late), 1);
+    assert!(retries(&lost) > 0 && collisions(&lost) > 0, "{} {}", retries(&lost), collisions(&lost));
+}
+
+#[test]
+fn what_is_late_by_chance_stays_within_its_bound() {
+    let clean = Run::of(&read(""));
+    let keys = "kind = \"late-telegrams\"; from = 4; service = \"data-exchange\"; up_to = \"1 us\"; cycle = 100";
+    let late = with(keys);
+    let more: Vec<_> = late
+        .cycles
+        .iter()
+        .zip(&clean.cycles)
+        .filter(|(row, _)| row.cycle > RUNS && row.cycle < 299)
+        .map(|(late, clean)| late.t_dx.expect("T_DX") - clean.t_dx.expect("T_DX"))
+        .collect();
+    let bound = Span::from_us(1) + Span::from_ns(30);
+    assert!(more.iter().all(|&by| by > -Span::from_ns(30) && by < bound));
+    assert!(more.iter().any(|&by| by > Span::from_ns(900)) && more.iter().any(|&by| by < Span::from_ns(100)));
+}
+
+#[test]
+fn a_clock_that_comes_twice_is_heard_twice() {
+    let run = with("kind = \"duplicate-telegrams\"; service = \"synch\"; after = \"100 ns\"; cycle = 100; for = 100");
+    assert_eq!(disturbed(&run, 2, Disturbance::Doubled), 100);
+    assert_eq!(collisions(&run), 0, "the copy ends before the first request begins");
+    let (clean, telegrams) = (Run::of(&read("")).telegrams.len(), run.telegrams.len());
+    assert_eq!(telegrams, clean + 100);
+    // A copy is told when it leaves, after the request that was planned before.
+    let is_doubled = |first: &&(Time, Time, Address, Vec<u8>)| {
+        run.telegrams.iter().any(|other| other.0 == first.1 + Span::from_ns(100) && other.3 == first.3)
+    };
+    let copies = run.telegrams.iter().filter(is_doubled);
+    assert_eq!(copies.count(), 100);
+}
+
+#[test]
+fn a_request_that_comes_twice_collides_with_its_answer() {
+    let run = with(
+        "kind = \"duplicate-telegrams\"; to = 4; service = \"data-exchange\"; after = \"1 us\"; telegrams = 1; cycle = 100; for = 1",
+    );
+    assert_eq!((collisions(&run), retries(&run)), (1, 1));
+}
+
+#[test]
+fn one_wrong_bit_in_a_thousand_is_a_retry_now_and_then_and_each_is_none_at_all() {
+    let run = with("kind = \"bit-errors\"; rate = \"1e-4\"; from = 4; service = \"data-exchange\"; cycle = 100");
+    // 200 replies of 231 bits: 4.6 with a wrong bit, give or take 2.1.
+    let wrong = disturbed(&run, 4, Disturbance::WrongBits);
+    assert!((1..=12).contains(&wrong), "{wrong}");
+    assert_eq!(retries(&run), wrong, "each is found");
+    let dead = with("kind = \"bit-errors\"; rate = \"1\"");
+    let joined = count(&dead, |seen| {
+        matches!(seen, Observation::SlaveState { to: isodp::observation::SlaveState::DataExch, .. })
+    });
+    assert_eq!((joined, data_telegrams(&dead, 3)), (0, 0), "nobody understands anything");
+}
+
+#[test]
+fn a_wrong_octet_is_found_by_the_parity_or_by_the_sum() {
+    for (octet, more) in [
+        (8, ""),
+        (8, "; flip = 3"),
+        (8, "; parity = \"good\""),
+        (20, "; parity = \"good\""),
+        (21, "; flip = 0x81"),
+        (1, "; flip = 3"),
+    ] {
+        let keys = format!(
+            "kind = \"wrong-octet\"; octet = {octet}{more}; from = 4; service = \"data-exchange\"; telegrams = 1; cycle = 100; for = 1; every = 50"
+        );
+        let run = with(&keys);
+        assert_eq!((disturbed(&run, 4, Disturbance::WrongBits), retries(&run)), (4, 4), "{keys}");
+    }
+}
+
+#[test]
+fn two_wrong_octets_that_leave_the_sum_as_it_was_pass() {
+    // The shaft stands and signs of life are a high nibble: the last octet of G1_XIST2 is always the same, and of its sum
+    // the low nibble.
+    let clean = Run::of(&read(""));
+    let reply = |(_, _, who, octets): &&(_, _, _, Vec<u8>)| *who == address(4) && octets.len() == 21;
+    let octets = &clean.telegrams.iter().rev().find(reply).expect("a reply").3;
+    let flip = (0..4).map(|bit| 1 << bit).find(|mask| (octets[18] ^ octets[19]) & mask == 0).expect("equal bits");
+    let wrong = |octet: u8| {
+        format!(
+            "[[disturbance]]\nkind = \"wrong-octet\"\nname = \"{octet}\"\noctet = {octet}\nflip = {flip}\n\
+             parity = \"good\"\nfrom = 4\nservice = \"data-exchange\"\ncycle = 100\nfor = 10\n"
+        )
+    };
+    let run = Run::of(&read(&(wrong(19) + &wrong(20))));
+    assert_eq!((disturbed(&run, 4, Disturbance::WrongBits), retries(&run)), (20, 0), "the sum is right");
+    let run = Run::of(&read(&wrong(20)));
+    // After the first one the slave gets no repeat until it answers.
+    assert_eq!(count(&run, |seen| matches!(seen, Observation::NoAnswer { .. })), 10, "the sum alone is wrong");
+}
