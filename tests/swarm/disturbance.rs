@@ -70,6 +70,20 @@ pub(super) const KINDS: &[(&str, Generator)] = &[
     ("mute", |draw, scene| Some(station(draw, scene))),
     ("deaf", |draw, scene| Some(station(draw, scene))),
     ("restart", |draw, scene| Some(station(draw, scene))),
+    ("gc-jitter", |draw, scene| {
+        let ns = |draw: &mut Draw| draw.within(1..=2_000);
+        let shape = match draw.within(0..=6) {
+            0 => format!("shape = \"uniform\"\nhalf_width = \"{} ns\"\n", ns(draw)),
+            1 => format!("shape = \"normal\"\nsigma = \"{} ns\"\n", ns(draw) / 4 + 1),
+            2 => "shape = \"bounded-normal\"\nsigma = \"100 ns\"\nbound = \"300 ns\"\n".to_owned(),
+            3 => format!("shape = \"sine\"\namplitude = \"{} ns\"\nperiod = {}\n", ns(draw), draw.within(2..=100)),
+            4 => format!("shape = \"step\"\noffset = \"-{} ns\"\n", ns(draw)),
+            5 => format!("shape = \"drift\"\nper_cycle = \"{} ns\"\nbound = \"2 us\"\n", draw.within(-50..=50)),
+            _ => "shape = \"table\"\noffsets = [\"0 ns\", \"900 ns\", \"-1 us\"]\n".to_owned(),
+        };
+        let accumulate = if draw.percent(20) { "accumulate = true\n" } else { "" };
+        scene.network.clocked.then(|| Drawn::new(shape + accumulate, false))
+    }),
     ("crystal-offset", |draw, scene| {
         let offset = format!("offset = \"{} ppm\"\n", draw.within(-100..=100));
         Some(Drawn::new(station(draw, scene).keys + &offset, false))
@@ -114,7 +128,8 @@ fn window(draw: &mut Draw, scene: &Scene<'_>) -> String {
     let (from, to) = scene.cycles;
     let first = draw.within(from..=to - 20);
     let room = to - first - 5;
-    let length = draw.within(1..=room.min(draw.one(&[1, 3, 15, 15, 60])));
+    let longest = draw.one(&[1, 3, 15, 15, 60]);
+    let length = draw.within(1..=room.min(longest));
     let every = draw.within(length..=length * 4);
     let times = (room / every).max(1);
     let repeated = draw.percent(30) && times > 1;
@@ -126,7 +141,8 @@ fn window(draw: &mut Draw, scene: &Scene<'_>) -> String {
     let us = |span: Span| span.ticks() / 12_000;
     let (begin, end) = scene.times;
     // Anywhere in the cycle.
-    let at = (begin + scene.cycle * (first - from) + Span::from_ticks(draw.within(0..=scene.cycle.ticks() - 1))).min(end);
+    let at =
+        (begin + scene.cycle * (first - from) + Span::from_ticks(draw.within(0..=scene.cycle.ticks() - 1))).min(end);
     let part = draw.within(1..=100);
     let length = us(scene.cycle * length) * part / 100 + 1;
     let every = us(scene.cycle * every) + 1;
@@ -145,8 +161,19 @@ fn whom(draw: &mut Draw, scene: &Scene<'_>) -> Drawn {
     let network = scene.network;
     let slave = draw.one(&network.slaves).address;
     let services = [
-        "any", "all", "requests", "replies", "synch", "global-control", "data-exchange", "diagnosis", "set-prm",
-        "chk-cfg", "fdl-status", "token", "acyclic",
+        "any",
+        "all",
+        "requests",
+        "replies",
+        "synch",
+        "global-control",
+        "data-exchange",
+        "diagnosis",
+        "set-prm",
+        "chk-cfg",
+        "fdl-status",
+        "token",
+        "acyclic",
     ];
     match draw.within(0..=5) {
         0 => Drawn::new(format!("from = {slave}\n"), false),
