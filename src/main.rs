@@ -10,9 +10,10 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isodp::sim::network::NetworkEvent;
 use isodp::sim::queue::NearQueue;
 use isodp::study::budget::Budget;
+use isodp::study::export::capture;
 use isodp::study::gsd::Gsd;
 use isodp::study::plan::command::{Call, answer};
-use isodp::study::replay::{Window, replay};
+use isodp::study::replay::{self, Window};
 use isodp::study::run::{Progress, layout};
 use isodp::study::scenario::{Extent, Scenario, disturbance};
 use isodp::study::what_if::command as what_if;
@@ -152,6 +153,9 @@ struct ReplayArgs {
     /// Seed of all random streams, instead of the scenario's.
     #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
     seed: Option<u64>,
+    /// Writes flight.txt, flight.pcapng with its dissector and flight.vcd of these cycles too, to DIR/<scenario>/.
+    #[arg(long, value_name = "DIR", conflicts_with = "sets")]
+    out: Option<PathBuf>,
     /// What if: from the cycle on another future runs beside the original, with this value of the scenario, for example
     /// slave.3.crystal='40 ppm'. May be given several times.
     #[arg(long = "set", visible_alias = "what-if", value_name = "KEY=VALUE", value_parser = assignment)]
@@ -311,13 +315,19 @@ fn figures_command(file: Option<&Path>) -> Result<String, Box<dyn std::error::Er
 }
 
 fn replay_command(args: ReplayArgs) -> Result<String, Box<dyn std::error::Error>> {
-    let ReplayArgs { scenario: file, cycle, window, seed, sets, run_sets } = args;
+    let ReplayArgs { scenario: file, cycle, window, seed, out, sets, run_sets } = args;
     let run_sets = with_seed(run_sets, seed);
     if !sets.is_empty() {
         return what_if::answer(&what_if::Call { file, run_sets, sets, cycle, window });
     }
     let scenario = Scenario::load(&file, &run_sets)?;
-    Ok(replay::<NearQueue<NetworkEvent>>(&scenario, Window::around(cycle, window.unwrap_or(0)))?)
+    let around = Window::around(cycle, window.unwrap_or(0));
+    let recording = replay::record::<NearQueue<NetworkEvent>>(&scenario, around)?;
+    let page = replay::text(&recording);
+    let Some(out) = out else { return Ok(page) };
+    let dir = out.join(&scenario.name);
+    let files = capture::write(&dir, &recording)?;
+    Ok(format!("{page}\n{} files in {}\n", files.len(), dir.display()))
 }
 
 /// Overrides with that of the seed, where one is given.

@@ -361,6 +361,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             self.tune(index);
         }
         self.bus.silence(index, self.now);
+        recorder.withdrawn(self.slots[index].address, self.now);
         self.tell(index, &Observation::Power { on }, recorder);
     }
     /// Tells what happened to a station and was not its own doing.

@@ -6,6 +6,7 @@ use super::class2;
 use super::disturbance;
 use super::error::Fault;
 use super::expect;
+use super::flight;
 use super::gsd;
 use super::jitter;
 use super::kinds::{self, ACTIONS, Kind, address};
@@ -24,6 +25,7 @@ use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
 use crate::sim::jitter::GcJitter;
 use crate::sim::motion::{Angle, Motion};
+use crate::study::invocation::Invocation;
 use crate::study::plan::Plan;
 use crate::study::quantity::{bit_rate, ppb, tbit};
 use crate::time::{BitRate, Span, Tbit};
@@ -106,6 +108,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         events,
         disturbances,
         record,
+        invocation: Invocation::default(),
         expectations,
     };
     if scenario.master.pace != Pace::Synch {
@@ -677,6 +680,7 @@ fn record(mut section: Section<'_>, reader: &mut Reader<'_>) -> Record {
     let tables = CsvTable::ALL.iter().filter(|&&(key, _)| flag(key)).map(|&(_, table)| table).collect();
     let (files, plots) = (flag("files"), flag("plots"));
     let rows = section.optional(reader, "rows", number(1..=i64::MAX as u64)).unwrap_or(20_000);
+    let flight = flight::read(section.table(reader, "flight"), reader);
     section.finish(reader);
-    Record { files, plots, tables, rows }
+    Record { files, plots, tables, rows, flight }
 }
