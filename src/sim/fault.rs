@@ -5,22 +5,27 @@
 
 pub mod clock;
 pub mod damage;
+pub mod instant;
 pub mod line;
 pub mod manner;
 pub mod order;
+pub mod source;
 pub mod station;
 pub mod turn;
 pub mod which;
 pub mod window;
 
 use crate::sim::fault::clock::{CrystalFault, Pull};
+use crate::sim::fault::instant::{InstantFault, Straying};
 use crate::sim::fault::line::{Line, LineFault};
 use crate::sim::fault::order::OrderFault;
+use crate::sim::fault::source::{Source, SourceFault};
 use crate::sim::fault::station::{Apart, StationFault};
 use crate::sim::fault::turn::Turns;
 use crate::sim::fault::window::Window;
 use crate::sim::jitter::{GcJitter, JitterSource};
 use crate::sim::noise::{Purpose, Stream};
+use crate::sim::topology::Place;
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -40,10 +45,18 @@ pub struct Disturbance {
 pub enum What {
     /// It decides what becomes of telegrams.
     Line(LineFault),
+    /// It puts something on the line.
+    Source(SourceFault),
     /// It takes stations off the line, or their supply away.
     Station(Vec<Address>, StationFault),
     /// It changes the rate of crystals.
     Crystal(Vec<Address>, CrystalFault),
+    /// It moves instants of these stations.
+    Instant(Vec<Address>, InstantFault),
+    /// It adds jitter of this half width to the link of this index.
+    Repeater(usize, Span),
+    /// It cuts the cable at this place.
+    Cut(Place),
     /// It makes the SYNCH of the isochronous master stray; whether its strays add up, too (Model: D1).
     Clock(GcJitter, bool),
     /// It orders something of the masters of these slaves.
@@ -54,8 +67,11 @@ impl What {
     /// The stations that it means, where it names them.
     pub fn stations(&self) -> &[Address] {
         match self {
-            Self::Line(_) | Self::Clock(..) => &[],
-            Self::Station(stations, _) | Self::Crystal(stations, _) | Self::Order(stations, _) => stations,
+            Self::Line(_) | Self::Clock(..) | Self::Source(_) | Self::Repeater(..) | Self::Cut(_) => &[],
+            Self::Station(stations, _)
+            | Self::Crystal(stations, _)
+            | Self::Instant(stations, _)
+            | Self::Order(stations, _) => stations,
         }
     }
 }
@@ -70,6 +86,8 @@ pub(super) struct Turning {
     pub what: What,
     /// What it makes of each station's crystal, in the order of the stations.
     pub pulls: Vec<Pull>,
+    /// What it puts on the line, if it does.
+    pub source: Option<Box<Source>>,
 }
 
 /// All disturbances of a network at work.
@@ -80,6 +98,8 @@ pub struct Faults {
     apart: Vec<Apart>,
     /// Jitter of SYNCH, each with the number of its disturbance.
     clocks: Vec<(u16, JitterSource)>,
+    receivers: Vec<Straying>,
+    answers: Vec<Straying>,
     /// All of them, as the scenario has them.
     all: Vec<Disturbance>,
     turning: Vec<Turning>,
@@ -102,7 +122,14 @@ impl Faults {
                     let source = JitterSource::of_disturbance(jitter.clone(), *window, *accumulates, stream);
                     faults.clocks.push((number, source.expect("a checked jitter")));
                 }
-                What::Crystal(..) | What::Order(..) => {}
+                What::Instant(stations, fault) => {
+                    let straying = Straying::new((number, name, *window), stations, *fault, seed);
+                    match fault {
+                        InstantFault::Receiver { .. } => faults.receivers.push(straying),
+                        InstantFault::Answer { .. } => faults.answers.push(straying),
+                    }
+                }
+                What::Source(_) | What::Crystal(..) | What::Order(..) | What::Repeater(..) | What::Cut(_) => {}
             }
             if matches!(what, What::Line(_)) {
                 continue;
@@ -112,25 +139,54 @@ impl Faults {
                 _ => None,
             };
             let pulls = what.stations().iter().filter_map(pull).collect();
+            let source = match what {
+                What::Source(fault) => Some(Box::new(Source::new(name, fault.clone(), seed))),
+                _ => None,
+            };
             faults.turning.push(Turning {
                 number,
                 name: name.clone(),
                 turns: Turns::new(*window),
                 what: what.clone(),
                 pulls,
+                source,
             });
         }
         faults
     }
     /// Takes over what `before` had drawn for disturbances that are in both.
     pub(super) fn go_on_from(&mut self, before: &Self) {
-        let same = |number: u16| before.all.iter().position(|other| *other == self.all[usize::from(number)]);
+        let all = &self.all;
+        let same = |number: u16| before.all.iter().position(|other| *other == all[usize::from(number)]);
         for (number, source) in &mut self.clocks {
             let old = same(*number).and_then(|old| before.clocks.iter().find(|(other, _)| usize::from(*other) == old));
             if let Some((_, old)) = old {
                 source.clone_from(old);
             }
         }
+        let strayings = [(&mut self.receivers, &before.receivers), (&mut self.answers, &before.answers)];
+        for (new, old) in strayings {
+            for straying in new {
+                let old = same(straying.number).and_then(|n| old.iter().find(|other| usize::from(other.number) == n));
+                if let Some(old) = old {
+                    straying.go_on_from(old);
+                }
+            }
+        }
+    }
+    /// Whether ends of telegrams reach stations early or late.
+    pub const fn strays_arrivals(&self) -> bool {
+        !self.receivers.is_empty()
+    }
+    /// How much later than it comes `listener` captures a telegram's end. Signed.
+    #[cold]
+    pub fn capture_stray(&mut self, listener: Address, running: (Time, u64)) -> Span {
+        self.receivers.iter_mut().fold(Span::ZERO, |sum, straying| sum + straying.draw(listener, running))
+    }
+    /// How much later than usual `sender` answers.
+    #[inline]
+    pub fn answer_delay(&mut self, sender: Address, running: (Time, u64)) -> Span {
+        self.answers.iter_mut().fold(Span::ZERO, |sum, straying| sum + straying.draw(sender, running))
     }
     /// How much later than nominal disturbances make the SYNCH leave that should leave at `at` and begins the cycle of
     /// this number. Signed.

@@ -5,22 +5,25 @@
 //! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
 mod disturbed;
+mod source;
 mod tune;
 mod turn;
 
+use crate::fdl::params::BusParams;
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
 use crate::observation::Observation;
-use crate::sim::bus::{Bus, Flight, FlightId};
+use crate::sim::bus::{Bus, Flight, FlightId, Mark};
 use crate::sim::crystal::Crystal;
+use crate::sim::cut::Cuts;
 use crate::sim::fault::Faults;
 use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{Resolution, Shaft};
 use crate::sim::noise::LinkJitter;
 use crate::sim::queue::{Key, NearQueue, Phase, Queue};
-use crate::sim::record::{Origin, Recorder, Stamp, Transmission};
+use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
-use crate::wire::Address;
+use crate::wire::{Address, Frame};
 use disturbed::Held;
 use turn::Turning;
 
@@ -48,17 +51,20 @@ pub struct Wiring {
     pub tree: Tree,
     /// The links with jitter, by index, and what each draws.
     pub jitter: Vec<(usize, LinkJitter)>,
+    /// Where cables may be cut, each place with the name of the disturbance that does it.
+    pub cuts: Vec<(String, Place)>,
 }
 
 impl Wiring {
     /// One segment of cable.
     pub fn line() -> Self {
-        Self { tree: Tree::line(), jitter: Vec::new() }
+        Self { tree: Tree::line(), jitter: Vec::new(), cuts: Vec::new() }
     }
     /// The bus of stations at `places`.
     fn bus(self, places: &[Place]) -> Bus {
         let (unsteady, jitter): (Vec<_>, Vec<_>) = self.jitter.into_iter().unzip();
-        Bus::new(Delays::new(&self.tree, places, &unsteady), jitter)
+        let cuts = Cuts::new(self.cuts, &self.tree, places);
+        Bus::new(Delays::new(&self.tree, places, &unsteady), jitter).with_cuts(cuts)
     }
 }
 
@@ -114,6 +120,8 @@ enum Event {
     Turn(u16),
     /// A disturbance of this number among those that turn changes rates of crystals.
     Step(u16),
+    /// A disturbance of this number among those that turn puts something on the line.
+    Source(u16),
 }
 
 /// What a station's supply depends on.
@@ -167,6 +175,8 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     jitter: JitterSource,
     faults: Faults,
     held: Held,
+    /// Room for what comes onto the line from nowhere.
+    foreign: Frame,
     acts: Vec<(usize, Act<S::Command>)>,
     /// Which of them do not count any more.
     cancelled: core::ops::Range<usize>,
@@ -230,11 +240,12 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             by_address,
             curious: Vec::new(),
             neighbours: Vec::new(),
-            bus: wiring.bus(&places),
+            bus: wiring.bus(&places).with_t_syn(rate.span(BusParams::T_SYN)),
             queue: Q::default(),
             jitter,
             faults,
             held: Held::default(),
+            foreign: Frame::new(),
             acts: Vec::new(),
             cancelled: 0..0,
             cycle_acts: Vec::new(),
@@ -318,6 +329,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Event::Held(which) => self.release(slot, usize::from(which), recorder),
             Event::Turn(number) => self.turn(number.into(), recorder),
             Event::Step(number) => self.step_crystals(number.into()),
+            Event::Source(number) => self.emit(number.into(), recorder),
         }
         true
     }
@@ -378,10 +390,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let sample = if station.sample_with_telegrams { self.raw(slot) } else { 0 };
         let now = self.local(slot);
         // Without octets it was cut off before it began.
-        if station.powered && !self.bus.flight(id).frame.is_empty() && !self.is_deaf(slot) {
+        if station.powered && !self.bus.flight(id).frame.is_empty() && self.hears(slot, id) {
             self.out.clear();
             let flight = self.bus.flight(id);
-            let octets = if flight.broken { &[] } else { flight.frame.octets() };
+            let octets = if flight.mark.broken { &[] } else { flight.frame.octets() };
             let input = Input::Telegram(Heard { octets, sample });
             self.slots[slot].site.machine.step(now, input, &mut self.out);
             self.bus.heard(id);
@@ -389,6 +401,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         } else {
             self.bus.heard(id);
         }
+    }
+    /// Whether a telegram comes to a station's ears.
+    fn hears(&self, slot: usize, id: FlightId) -> bool {
+        self.bus.reaches(id, slot) && !self.is_deaf(slot)
     }
     /// Whether a disturbance keeps a station from hearing.
     fn is_deaf(&self, slot: usize) -> bool {
@@ -516,6 +532,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let jitter = jitter.max(self.now - start);
             start += jitter;
             end += jitter;
+        } else {
+            let delay = self.faults.answer_delay(address, (start, self.clocks_begun(false)));
+            start += delay;
+            end += delay;
         }
         if send.clock {
             // The master's transmitter runs, whatever becomes of the telegram.
@@ -528,14 +548,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             return;
         }
         let Some((_, frame)) = self.out.sending() else { return };
-        let flight = self.bus.send(slot, (start, end), frame, (Origin::Sender, false));
+        let flight = self.bus.send(slot, (start, end), frame, Mark::OWN);
         self.sent_off(slot, flight, recorder);
     }
     /// Tells that a telegram is on the line, and its listeners when its end will reach them.
     fn sent_off<R: Recorder>(&mut self, slot: usize, (id, hit): (FlightId, Option<usize>), recorder: &mut R) {
         let sender = self.slots[slot].address;
-        let Flight { start, end, origin, ref frame, .. } = *self.bus.flight(id);
-        recorder.telegram(&Transmission { start, end, sender, octets: frame.octets(), origin });
+        let Flight { start, end, mark, ref frame, .. } = *self.bus.flight(id);
+        recorder.telegram(&Transmission { start, end, sender, octets: frame.octets(), origin: mark.origin });
         if let Some(with) = hit {
             self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
         }
@@ -565,7 +585,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
     }
     fn deliver_to(&mut self, listener: usize, sender: usize, id: FlightId, route: Option<Route>) -> bool {
-        if listener == sender || !self.slots[listener].filter.passes(route) {
+        if listener == sender && !self.bus.flight(id).mark.apart || !self.slots[listener].filter.passes(route) {
             return false;
         }
         self.bus.add_listeners(id, 1);
@@ -574,14 +594,19 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// A request for all passes every filter. Only the nearest neighbour is told now and tells the next one when it has
     /// heard, so that the queue holds one event of the telegram, not one for each station. Where links have jitter, who
-    /// is nearest differs from telegram to telegram, and all are told now.
+    /// is nearest differs from telegram to telegram, and all are told now; so where receivers have.
     fn broadcast(&mut self, sender: usize, id: FlightId) {
+        if self.bus.flight(id).mark.apart {
+            self.bus.add_listeners(id, 1);
+            self.push_telegram(sender, id, Event::Telegram(id));
+        }
         let count = self.neighbours[sender].len();
         match count {
+            0 if self.bus.flight(id).mark.apart => return,
             0 => return self.bus.unheard(id),
             count => self.bus.add_listeners(id, count as u16),
         }
-        if self.bus.delays().is_steady() {
+        if self.bus.delays().is_steady() && !self.faults.strays_arrivals() {
             return self.tell_neighbour(id, 0);
         }
         for rank in 0..count {
@@ -596,7 +621,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// The telegram's end reaches `listener`. Of telegrams that end there at one instant the one sent first comes first.
     fn push_telegram(&mut self, listener: usize, id: FlightId, event: Event) {
-        let (at, number) = self.bus.arrival(id, listener);
+        let (mut at, number) = self.bus.arrival(id, listener);
+        if self.faults.strays_arrivals() {
+            let running = (self.bus.flight(id).start, self.clocks_begun(false));
+            at += self.faults.capture_stray(self.slots[listener].address, running);
+            // Nobody hears what has not been said.
+            at = at.max(self.bus.flight(id).end).max(self.now);
+        }
         let key = Key::new(at, Phase::Telegram, self.slots[listener].address.get(), number);
         self.queue.push(key, NetworkEvent(event));
     }

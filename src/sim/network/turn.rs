@@ -8,6 +8,7 @@ use super::{Event, Network, NetworkEvent, Phase, Queue};
 use crate::fdl::Station;
 use crate::observation::{Disturbance, Observation};
 use crate::sim::fault::order::OrderFault;
+use crate::sim::fault::source::Source;
 use crate::sim::fault::station::StationFault;
 use crate::sim::fault::turn::{Turn, Turns};
 use crate::sim::fault::{self, What};
@@ -19,12 +20,12 @@ use crate::wire::Address;
 #[derive(Clone)]
 pub(super) struct Turning<C> {
     /// Number of the disturbance in the scenario, from 0.
-    number: u16,
+    pub number: u16,
     name: String,
     what: What,
-    turns: Turns,
+    pub turns: Turns,
     /// It is no more among the disturbances: a burst that goes on ends, and no other begins.
-    retired: bool,
+    pub retired: bool,
     /// Whom it is told of: the stations that it means, or the first station.
     pub slots: Vec<usize>,
     pub effect: Effect<C>,
@@ -37,8 +38,14 @@ pub(super) enum Effect<C> {
     None,
     /// The supply goes off and on.
     Supply,
+    /// A link has more jitter.
+    Link,
+    /// A cable is cut and whole again.
+    Cut,
     /// Crystals run at other rates.
     Crystals(Tuning),
+    /// Something comes onto the line.
+    Source(Box<Source>),
     /// Orders to masters.
     Orders { fault: OrderFault, begin: Vec<(usize, C)>, end: Vec<(usize, C)> },
 }
@@ -51,7 +58,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
     }
     /// From now on these are the disturbances that begin and end. One that was there before goes on as it is, any other
-    /// begins where its window is now.
+    /// begins where its window is now; what comes once at a beginning that is past does not come.
     pub(super) fn turn_over(&mut self, all: Vec<fault::Turning>) {
         let known = |turning: &Turning<_>, new: &fault::Turning| {
             !turning.retired
@@ -65,14 +72,18 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
         }
         for mut new in all {
-            if !self.turning.iter().any(|turning| known(turning, &new)) {
-                new.turns = Turns::from(new.turns.window(), self.now, self.clocks);
-                self.add_turning(new);
+            if self.turning.iter().any(|turning| known(turning, &new)) {
+                continue;
             }
+            new.turns = Turns::from(new.turns.window(), self.now, self.clocks);
+            if new.source.as_ref().is_some_and(|source| !source.goes_on()) {
+                new.turns.leave_out_past(self.now, self.clocks);
+            }
+            self.add_turning(new);
         }
     }
     fn add_turning(&mut self, new: fault::Turning) {
-        let fault::Turning { number, name, turns, what, pulls } = new;
+        let fault::Turning { number, name, turns, what, pulls, source } = new;
         let mut slots: Vec<_> = what.stations().iter().filter_map(|&station| self.slot_of(station)).collect();
         if slots.is_empty() {
             slots.push(Self::CLOCK);
@@ -81,7 +92,11 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             What::Station(_, StationFault::Restart) => Effect::Supply,
             What::Crystal(_, fault) => Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false }),
             What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
-            What::Line(_) | What::Station(..) | What::Clock(..) => Effect::None,
+            What::Repeater(..) => Effect::Link,
+            What::Cut(_) => Effect::Cut,
+            What::Line(_) | What::Source(_) | What::Station(..) | What::Clock(..) | What::Instant(..) => {
+                source.map_or(Effect::None, Effect::Source)
+            }
         };
         self.turning.push(Turning { number, name, what, turns, retired: false, slots, effect });
         self.plan_turn(self.turning.len() - 1);
@@ -94,7 +109,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             self.push(self.now, Phase::Command, slot, Event::Turn(index as u16));
         }
     }
-    fn slot_of(&self, station: Address) -> Option<usize> {
+    pub(super) fn slot_of(&self, station: Address) -> Option<usize> {
         self.by_address[usize::from(station.get())].map(usize::from)
     }
     /// What the disturbance of this number, from 0, orders when a burst begins and when one ends.
@@ -112,7 +127,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// Sees to it that the disturbance turns next when it has to.
-    fn plan_turn(&mut self, index: usize) {
+    pub(super) fn plan_turn(&mut self, index: usize) {
         let Turning { turns, slots, retired, .. } = &self.turning[index];
         if *retired {
             return;
@@ -166,7 +181,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         match self.turning[index].effect {
             Effect::Crystals(_) => self.turn_crystals(index, on),
             Effect::Orders { fault, .. } => self.order_burst((index, fault), on, recorder),
-            Effect::None | Effect::Supply => {}
+            Effect::Source(_) if on => self.start_source(index),
+            Effect::Link => self.bus.disturb_link(&self.turning[index].name, on),
+            Effect::Cut => self.bus.cut(&self.turning[index].name, on, self.now),
+            Effect::Source(_) | Effect::None | Effect::Supply => {}
         }
         self.plan_turn(index);
     }

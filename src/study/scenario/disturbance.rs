@@ -6,7 +6,10 @@ pub(super) mod clock;
 mod gc_jitter;
 mod line;
 mod manner;
+pub(super) mod path;
+mod source;
 pub(super) mod station;
+pub(super) mod token;
 pub mod which;
 
 use super::error::Fault;
@@ -52,6 +55,9 @@ pub const DISTURBANCES: &[DisturbanceKind] = &[
     line::DUPLICATE_TELEGRAMS,
     line::BIT_ERRORS,
     line::WRONG_OCTET,
+    source::NOISE,
+    source::FOREIGN_TELEGRAM,
+    token::LATE_TOKEN,
     station::SILENT,
     station::MUTE,
     station::DEAF,
@@ -60,6 +66,10 @@ pub const DISTURBANCES: &[DisturbanceKind] = &[
     clock::CRYSTAL_OFFSET,
     clock::CRYSTAL_WANDER,
     clock::TEMPERATURE_STEP,
+    path::RECEIVER_JITTER,
+    path::REPEATER_JITTER,
+    path::T_SDR_JITTER,
+    path::CABLE_CUT,
     application::HOLD_LIFE_SIGN,
     application::JUMP_LIFE_SIGN,
     application::REPEAT_LIFE_SIGN,
