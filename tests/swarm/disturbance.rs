@@ -66,6 +66,32 @@ pub(super) const KINDS: &[(&str, Generator)] = &[
         let drawn = telegrams(draw, scene, &wrong);
         Some(Drawn { token_at_risk: true, ..drawn })
     }),
+    ("noise", |draw, scene| {
+        let mean = match draw.within(0..=2) {
+            0 => String::new(),
+            _ => format!("mean = \"{} us\"\n", draw.within(20..=20_000)),
+        };
+        let octets = draw.within(1..=9);
+        let keys = format!("{mean}octets = {octets}\noctets_to = {}\n", octets + draw.within(0..=20));
+        Some(Drawn::new(keys + &near(draw, scene), true))
+    }),
+    ("foreign-telegram", |draw, scene| {
+        let slave = draw.one(&scene.network.slaves).address;
+        let (from, to) = (draw.one(&scene.network.masters()), draw.one(&scene.network.masters()));
+        let what = match draw.within(0..=4) {
+            0 => format!("token = {{ to = {to}, from = {from} }}\n"),
+            1 => format!("token = {{ to = {}, from = {from} }}\n", draw.within(0..=125)),
+            2 => format!("data = {{ to = {slave}, from = {from}, fc = 0x7D, dsap = 60, ssap = 62 }}\n"),
+            3 => format!("data = {{ to = {slave}, from = {from}, fc = 0x5D, du = \"00 00 04 00\" }}\n"),
+            _ => "octets = \"68 05 05 68 FF 00\"\n".to_owned(),
+        };
+        let after = format!("after = \"{} us\"\n", draw.within(0..=1_000));
+        Some(Drawn::new(what + &after + &near(draw, scene), true))
+    }),
+    ("late-token", |draw, scene| {
+        let master = draw.one(&scene.network.masters());
+        Some(Drawn::new(format!("station = {master}\nby = \"{} us\"\n", draw.within(0..=500)), true))
+    }),
     ("silent", |draw, scene| Some(station(draw, scene))),
     ("mute", |draw, scene| Some(station(draw, scene))),
     ("deaf", |draw, scene| Some(station(draw, scene))),
@@ -101,6 +127,34 @@ pub(super) const KINDS: &[(&str, Generator)] = &[
             draw.within(-50..=50)
         );
         Some(Drawn::new(station(draw, scene).keys + &step, false))
+    }),
+    ("receiver-jitter", |draw, scene| {
+        let width = format!("half_width = \"{} ns\"\n", draw.within(0..=1_000));
+        Some(Drawn { keys: station(draw, scene).keys + &width, token_at_risk: true })
+    }),
+    ("repeater-jitter", |draw, scene| {
+        let repeaters = &scene.network.places.repeaters;
+        let number = draw.within(0..=2) as usize;
+        let keys = format!("half_width = \"{} ns\"\n", draw.within(0..=200));
+        let repeater = repeaters.get(number % repeaters.len().max(1))?;
+        Some(Drawn::new(format!("repeater = \"{repeater}\"\n{keys}"), true))
+    }),
+    ("t-sdr-jitter", |draw, scene| {
+        let slower = match draw.within(0..=2) {
+            0 => format!("by = \"{} tbit\"\n", draw.within(0..=300)),
+            1 => format!("up_to = \"{} tbit\"\n", draw.within(0..=300)),
+            _ => format!("by = \"{} us\"\nup_to = \"5 us\"\n", draw.within(0..=100)),
+        };
+        Some(slave(draw, scene, &slower)).map(|drawn| Drawn { token_at_risk: true, ..drawn })
+    }),
+    ("cable-cut", |draw, scene| {
+        let places = &scene.network.places;
+        let segment = match &places.segments[..] {
+            [] => String::new(),
+            segments => format!("segment = \"{}\"\n", draw.one(segments)),
+        };
+        let position = draw.within(1..=(places.cable_m - 1).max(1));
+        (position < places.cable_m).then(|| Drawn::new(format!("{segment}position = \"{position} m\"\n"), true))
     }),
     ("hold-life-sign", |draw, scene| Some(slave(draw, scene, ""))),
     ("jump-life-sign", |draw, scene| {
@@ -184,6 +238,12 @@ fn whom(draw: &mut Draw, scene: &Scene<'_>) -> Drawn {
         4 => Drawn::new(format!("service = \"{}\"\n", draw.one(&services)), true),
         _ => Drawn::new("", true),
     }
+}
+
+/// At whose place it comes onto the line.
+fn near(draw: &mut Draw, scene: &Scene<'_>) -> String {
+    let stations: Vec<u8> = scene.network.slaves.iter().map(|slave| slave.address).collect();
+    if draw.percent(50) { String::new() } else { format!("near = {}\n", draw.one(&stations)) }
 }
 
 /// How many of them.

@@ -69,6 +69,7 @@ pub(super) struct Network {
     master_keys: String,
     bus: String,
     rate: BitRate,
+    pub(super) places: Places,
 }
 
 /// The scenario of this seed, or why not even its network can be planned.
@@ -177,14 +178,16 @@ fn network(draw: &mut Draw) -> Network {
     }
     let bus = format!("rate = \"{name}\"\nhsa = {hsa}\ngap_factor = {}\n{}", draw.one(&[1, 1, 2, 5]), places.bus(rate));
     let master_keys = master_keys(draw, clocked, &places);
-    Network { clocked, master, class1, class2, slaves, stations, master_keys, bus, rate }
+    Network { clocked, master, class1, class2, slaves, stations, master_keys, bus, rate, places }
 }
 
 /// Where stations can be.
-struct Places {
-    segments: Vec<&'static str>,
+pub(super) struct Places {
+    pub(super) segments: Vec<&'static str>,
+    /// Names of what joins them.
+    pub(super) repeaters: Vec<String>,
     text: String,
-    cable_m: i64,
+    pub(super) cable_m: i64,
 }
 
 impl Places {
@@ -214,7 +217,7 @@ impl Places {
 fn places(draw: &mut Draw, rate: BitRate) -> Places {
     if draw.percent(55) {
         let cable_m = if rate == BitRate::M1_5 { draw.within(0..=190) } else { draw.within(0..=100) };
-        return Places { segments: Vec::new(), text: String::new(), cable_m };
+        return Places { segments: Vec::new(), repeaters: Vec::new(), text: String::new(), cable_m };
     }
     let segments = ["one", "two", "three", "four"][..draw.within(2..=4) as usize].to_vec();
     let cable_m = draw.within(1..=100);
@@ -222,8 +225,10 @@ fn places(draw: &mut Draw, rate: BitRate) -> Places {
     for segment in &segments {
         let _ = writeln!(text, "[[segment]]\nname = \"{segment}\"\ncable = \"{cable_m} m\"");
     }
+    let mut repeaters = Vec::new();
     for (i, to) in segments.iter().enumerate().skip(1) {
         let from = draw.one(&segments[..i]);
+        repeaters.push(format!("{from} - {to}"));
         let kind = draw.one(&["repeater", "olm", "ilm"]);
         let _ = writeln!(text, "[[repeater]]\nkind = \"{kind}\"\nfrom = \"{from}\"\nto = \"{to}\"");
         if draw.percent(50) {
@@ -234,7 +239,7 @@ fn places(draw: &mut Draw, rate: BitRate) -> Places {
             let _ = writeln!(text, "fibre = \"{} m\"", draw.within(0..=longest));
         }
     }
-    Places { segments, text, cable_m }
+    Places { segments, repeaters, text, cable_m }
 }
 
 fn crystal(draw: &mut Draw) -> String {
