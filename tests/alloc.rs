@@ -8,11 +8,13 @@ use isodp::device::node::Node;
 use isodp::sim::fingerprint::Fingerprints;
 use isodp::sim::network::{Network, NetworkEvent, Until};
 use isodp::sim::queue::{HeapQueue, NearQueue, Queue};
+use isodp::sim::record::Recorder;
 use isodp::study::build;
+use isodp::study::flight::FlightRecorder;
 use isodp::study::histogram::Histograms;
 use isodp::study::metric::Metrics;
 use isodp::study::run;
-use isodp::study::scenario::Scenario;
+use isodp::study::scenario::{Flight, Scenario};
 
 /// Cycles until everything is locked, linked and polled once: queues and buffers have their final size.
 const START: u64 = 1_000;
@@ -30,9 +32,14 @@ fn shipped(name: &str, sets: &[(&str, &str)]) -> Scenario {
 
 /// Allocations of the watched cycles, with metrics, histograms and fingerprints.
 fn allocations<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> u64 {
+    allocations_beside::<Q>(scenario, ())
+}
+/// The same with a further recorder.
+fn allocations_beside<Q: Queue<NetworkEvent>>(scenario: &Scenario, further: impl Recorder) -> u64 {
     let layout = run::layout(scenario);
     let histograms = Histograms::new(&layout);
-    let mut recorder = (Fingerprints::new(scenario.master.address), Metrics::new(layout, |_, _| 0.0, histograms));
+    let metrics = Metrics::new(layout, |_, _| 0.0, histograms);
+    let mut recorder = (Fingerprints::new(scenario.master.address), (metrics, further));
     let mut network: Network<Node, Q> = build::network(scenario);
     assert!(network.run(Until::Cycle(START), u64::MAX, &mut recorder));
     let info = allocation_counter::measure(|| {
@@ -115,4 +122,29 @@ fn links_in_both_tables_and_a_lost_publisher_allocate_nothing() {
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-network", &[])), 0);
     let sets = [("run.duration", "5 s"), ("event.1.at", "2.2 s"), ("event.2.at", "4.5 s")];
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-lost-publisher", &sets)), 0);
+}
+
+/// Every kind of a disturbance that begins and ends, several of them again and again.
+#[test]
+fn disturbances_of_stations_allocate_nothing() {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/reference.toml"));
+    let text = text.expect("a scenario")
+        + "\n[[disturbance]]\nkind = \"silent\"\nstation = 3\ncycle = 500\nfor = 1\nevery = 50\n\
+           [[disturbance]]\nkind = \"deaf\"\nstation = 4\ncycle = 510\nfor = 1\nevery = 50\n\
+           [[disturbance]]\nkind = \"crystal-wander\"\nstations = \"all slaves\"\nstep = \"10 ppb\"\ninterval = \"1 ms\"\nbound = \"2 ppm\"\n\
+           [[disturbance]]\nkind = \"temperature-step\"\nstation = 2\noffset = \"9 ppm\"\ntime_constant = \"1 s\"\ncycle = 500\nfor = 200\nevery = 400\n\
+           [[disturbance]]\nkind = \"hold-life-sign\"\nstation = 5\ncycle = 520\nfor = 1\nevery = 50\n";
+    let disturbed = Scenario::parse("disturbed", "disturbed", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
+    assert_eq!(allocations::<HeapQueue<NetworkEvent>>(&disturbed), 0);
+}
+
+/// The stretches that it keeps take room; the cycles that come and go do not.
+#[test]
+fn a_flight_recorder_that_keeps_nothing_allocates_nothing() {
+    for name in ["reference", "repeaters", "dxb-network"] {
+        let scenario = shipped(name, &[("run.duration", "10 s")]);
+        let flight = FlightRecorder::new(&scenario, &Flight::default());
+        assert_eq!(allocations_beside::<NearQueue<NetworkEvent>>(&scenario, flight), 0, "{name}");
+    }
 }

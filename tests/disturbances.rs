@@ -2,6 +2,7 @@
 //! others alone, and two at once do what each does.
 
 mod clock;
+mod gc_jitter;
 mod station;
 
 use isodp::observation::{Disturbance, Observation};

@@ -1,6 +1,7 @@
 //! The tests of the whole, in one binary.
 
 mod acyclic;
+mod budget;
 mod cli;
 mod determinism;
 mod devices;
@@ -12,6 +13,7 @@ mod encoder;
 mod encoder_scenarios;
 mod episodes;
 mod figures;
+mod flight;
 mod foreign;
 mod golden;
 mod gsd;
@@ -33,4 +35,5 @@ mod statistics;
 mod support;
 mod swarm;
 mod topology;
+mod verdicts;
 mod what_if;

@@ -21,7 +21,9 @@ use crate::sim::fault::source::{Source, SourceFault};
 use crate::sim::fault::station::{Apart, StationFault};
 use crate::sim::fault::turn::Turns;
 use crate::sim::fault::window::Window;
-use crate::time::Time;
+use crate::sim::jitter::{GcJitter, JitterSource};
+use crate::sim::noise::{Purpose, Stream};
+use crate::time::{Span, Time};
 use crate::wire::Address;
 
 /// One disturbance of a scenario.
@@ -46,6 +48,8 @@ pub enum What {
     Station(Vec<Address>, StationFault),
     /// It changes the rate of crystals.
     Crystal(Vec<Address>, CrystalFault),
+    /// It makes the SYNCH of the isochronous master stray; whether its strays add up, too (Model: D1).
+    Clock(GcJitter, bool),
     /// It orders something of the masters of these slaves.
     Order(Vec<Address>, OrderFault),
 }
@@ -54,7 +58,8 @@ impl What {
     /// The stations that it means, where it names them.
     pub fn stations(&self) -> &[Address] {
         match self {
-            Self::Line(_) | Self::Source(_) => &[],
+            Self::Line(_) | Self::Clock(..) => &[],
+            Self::Source(source) => source.near.as_slice(),
             Self::Station(stations, _) | Self::Crystal(stations, _) | Self::Order(stations, _) => stations,
         }
     }
@@ -65,6 +70,7 @@ impl What {
 pub(super) struct Turning {
     /// Number of the disturbance in the scenario, from 0.
     pub number: u16,
+    pub name: String,
     pub turns: Turns,
     pub what: What,
     /// What it makes of each station's crystal, in the order of the stations.
@@ -79,18 +85,30 @@ pub struct Faults {
     /// Those of the line.
     pub line: Line,
     apart: Vec<Apart>,
+    /// Jitter of SYNCH, each with the number of its disturbance.
+    clocks: Vec<(u16, JitterSource)>,
+    /// All of them, as the scenario has them.
+    all: Vec<Disturbance>,
     turning: Vec<Turning>,
 }
 
 impl Faults {
     /// The disturbances of a run with `seed` among `stations`, in the order of the scenario.
+    ///
+    /// # Panics
+    /// If a jitter cannot be: the caller checks scenarios.
     pub fn new(disturbances: &[Disturbance], seed: u64, stations: &[Address]) -> Self {
-        let mut faults = Self::default();
+        let mut faults = Self { all: disturbances.to_vec(), ..Self::default() };
         for (number, Disturbance { name, window, what }) in disturbances.iter().enumerate() {
             let number = number as u16;
             match what {
                 What::Line(fault) => faults.line.add((number, name, *window), *fault, (seed, stations)),
                 What::Station(stations, fault) => faults.apart.push(Apart::new(stations, *window, *fault)),
+                What::Clock(jitter, accumulates) => {
+                    let stream = Stream::of_disturbance(seed, name, 0, Purpose::GcJitter);
+                    let source = JitterSource::of_disturbance(jitter.clone(), *window, *accumulates, stream);
+                    faults.clocks.push((number, source.expect("a checked jitter")));
+                }
                 What::Source(_) | What::Crystal(..) | What::Order(..) => {}
             }
             if matches!(what, What::Line(_)) {
@@ -105,9 +123,33 @@ impl Faults {
                 What::Source(fault) => Some(Box::new(Source::new(name, fault.clone(), seed))),
                 _ => None,
             };
-            faults.turning.push(Turning { number, turns: Turns::new(*window), what: what.clone(), pulls, source });
+            faults.turning.push(Turning {
+                number,
+                name: name.clone(),
+                turns: Turns::new(*window),
+                what: what.clone(),
+                pulls,
+                source,
+            });
         }
         faults
+    }
+    /// Takes over what `before` had drawn for disturbances that are in both.
+    pub(super) fn go_on_from(&mut self, before: &Self) {
+        let same = |number: u16| before.all.iter().position(|other| *other == self.all[usize::from(number)]);
+        self.line.go_on_from(&before.line, same);
+        for (number, source) in &mut self.clocks {
+            let old = same(*number).and_then(|old| before.clocks.iter().find(|(other, _)| usize::from(*other) == old));
+            if let Some((_, old)) = old {
+                source.clone_from(old);
+            }
+        }
+    }
+    /// How much later than nominal disturbances make the SYNCH leave that should leave at `at` and begins the cycle of
+    /// this number. Signed.
+    #[inline]
+    pub fn clock_strays(&mut self, at: Time, cycle: u64) -> Span {
+        self.clocks.iter_mut().fold(Span::ZERO, |sum, (_, source)| sum + source.draw(at, cycle))
     }
     /// Hands over what begins and ends.
     pub(super) fn take_turning(&mut self) -> Vec<Turning> {

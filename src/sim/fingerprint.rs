@@ -145,7 +145,9 @@ impl Recorder for Fingerprints {
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         match what {
             Observation::CycleStart { cycle, .. } if stamp.station == self.master => self.checkpoint(*cycle),
-            Observation::CycleStart { .. } => {}
+            // What was done to a station shows in what it did.
+            Observation::CycleStart { .. }
+            | Observation::Disturbed { how: Disturbance::Begins | Disturbance::Ends, .. } => {}
             Observation::Latch { locked, inputs } => {
                 let latches = &mut self.station(stamp.station).latches;
                 latches.instant(stamp.at);
@@ -153,8 +155,6 @@ impl Recorder for Fingerprints {
                 latches.octets(&inputs.xist1.to_le_bytes());
                 latches.octets(&inputs.xist2.to_le_bytes());
             }
-            // What was done to a station shows in what it did.
-            Observation::Disturbed { how: Disturbance::Begins | Disturbance::Ends, .. } => {}
             event if event.is_event() => {
                 let states = &mut self.station(stamp.station).states;
                 states.instant(stamp.at);

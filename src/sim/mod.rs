@@ -7,6 +7,7 @@ pub mod bus;
 pub mod crystal;
 pub mod fault;
 pub mod fingerprint;
+pub mod jitter;
 pub mod motion;
 pub mod network;
 pub mod noise;

@@ -15,8 +15,9 @@ use crate::observation::Observation;
 use crate::sim::bus::{Bus, Flight, FlightId, Mark};
 use crate::sim::crystal::Crystal;
 use crate::sim::fault::Faults;
+use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{Resolution, Shaft};
-use crate::sim::noise::{JitterSource, LinkJitter};
+use crate::sim::noise::LinkJitter;
 use crate::sim::queue::{Key, NearQueue, Phase, Queue};
 use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::sim::topology::{Delays, Place, Tree};
@@ -119,19 +120,33 @@ enum Event {
     Source(u16),
 }
 
+/// What a station's supply depends on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Supply {
+    /// Its switch is on.
+    switched_on: bool,
+    /// Disturbances that keep it off.
+    outages: u16,
+}
+
+/// How fast a station's crystal should be (parts per billion).
+#[derive(Clone, Copy, Debug)]
+struct Offset {
+    own: i64,
+    /// What disturbances add.
+    pulled: i64,
+    /// It is not in force yet.
+    waits: bool,
+}
+
 #[derive(Clone)]
 struct Slot<S> {
     site: Site<S>,
     address: Address,
     filter: Filter,
     powered: bool,
-    /// Its switch is on.
-    switched_on: bool,
-    /// Disturbances that keep its supply off.
-    outages: u16,
-    /// Offset of its crystal with what disturbances add (parts per billion), and whether it waits to be in force.
-    ppb: i64,
-    untuned: bool,
+    supply: Supply,
+    offset: Offset,
     /// When its next cycle begins, once that is known.
     cycle_at: Option<Time>,
     sample_with_telegrams: bool,
@@ -200,16 +215,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let place = &mut by_address[usize::from(address.get())];
             assert!(place.is_none(), "two stations with address {address}");
             *place = Some(index as u8);
-            let (filter, ppb) = (site.machine.filter(), site.crystal.ppb());
+            let (filter, own) = (site.machine.filter(), site.crystal.ppb());
             slots.push(Slot {
                 site,
                 address,
                 filter,
                 powered: false,
-                switched_on: false,
-                outages: 0,
-                ppb,
-                untuned: false,
+                supply: Supply::default(),
+                offset: Offset { own, pulled: 0, waits: false },
                 cycle_at: None,
                 sample_with_telegrams: false,
                 deadlines: [Deadline::default(); Outbox::DEADLINES],
@@ -333,13 +346,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
     }
     fn switch<R: Recorder>(&mut self, slot: usize, on: bool, recorder: &mut R) {
-        self.slots[slot].switched_on = on;
-        self.supply(slot, recorder);
+        self.slots[slot].supply.switched_on = on;
+        self.update_supply(slot, recorder);
     }
     /// Brings a station's supply to what its switch and the disturbances make of it.
-    fn supply<R: Recorder>(&mut self, index: usize, recorder: &mut R) {
+    fn update_supply<R: Recorder>(&mut self, index: usize, recorder: &mut R) {
         let slot = &mut self.slots[index];
-        let on = slot.switched_on && slot.outages == 0;
+        let on = slot.supply.switched_on && slot.supply.outages == 0;
         if on == slot.powered {
             return;
         }
@@ -352,10 +365,11 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         for deadline in &mut slot.deadlines {
             deadline.due = None;
         }
-        if slot.untuned {
+        if slot.offset.waits {
             self.tune(index);
         }
         self.bus.silence(index, self.now);
+        recorder.withdrawn(self.slots[index].address, self.now);
         self.tell(index, &Observation::Power { on }, recorder);
     }
     /// Tells what happened to a station and was not its own doing.
@@ -398,7 +412,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         if self.slots[slot].cycle_at.take_if(|at| *at == self.now).is_none() {
             return; // It lost its supply before.
         }
-        if self.slots[slot].untuned {
+        if self.slots[slot].offset.waits {
             self.tune(slot);
         }
         if slot != Self::CLOCK {
@@ -506,7 +520,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let mut start = site.crystal.to_true(send.at);
         let mut end = site.crystal.to_true(send.at + self.rate.octets(frame.len()));
         if send.clock {
-            let jitter = self.jitter.draw().max(self.now - start);
+            let jitter = self.jitter.draw(start, self.clocks) + self.faults.clock_strays(start, self.clocks);
+            let jitter = jitter.max(self.now - start);
             start += jitter;
             end += jitter;
         }

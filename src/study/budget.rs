@@ -30,6 +30,7 @@ use std::path::Path;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use serde_json::{Value, json};
 
+use super::event_budget::NoHeadway;
 use super::export::decimal::Decimal;
 use super::export::{ExportError, Staged};
 use super::plot;
@@ -55,6 +56,9 @@ pub enum BudgetError {
         "{0}: no slave follows a clock, so there is no window to share out\n  help: a budget needs a master with SYNCH and isochronous slaves"
     )]
     NoClock(String),
+    /// One of the runs makes no headway.
+    #[error(transparent)]
+    NoHeadway(#[from] NoHeadway),
     /// A file could not be written.
     #[error(transparent)]
     Export(#[from] ExportError),
@@ -139,7 +143,7 @@ impl Budget {
     /// their number changes nothing.
     ///
     /// # Errors
-    /// No slave has a clock.
+    /// No slave has a clock, or a run makes no headway.
     pub fn of(scenario: &Scenario, watch: impl Fn(usize) + Sync) -> Result<Self, BudgetError> {
         if clocked(scenario).next().is_none() {
             return Err(BudgetError::NoClock(scenario.name.clone()));
@@ -152,7 +156,10 @@ impl Budget {
             watch(runs);
             (mask, measured)
         };
-        let measured: BTreeMap<Mask, Vec<Measured>> = masks.into_par_iter().map(run).collect();
+        // The first run that fails is the one to tell, whichever ended first.
+        let runs_by_mask: Vec<_> = masks.into_par_iter().map(run).collect();
+        let measured = runs_by_mask.into_iter().map(|(mask, measured)| Ok((mask, measured?)));
+        let measured = measured.collect::<Result<BTreeMap<Mask, Vec<Measured>>, NoHeadway>>()?;
         let slave = |(index, slave): (usize, &super::scenario::Slave)| SlaveBudget {
             address: slave.address,
             device: slave.device.name.clone().into_owned(),

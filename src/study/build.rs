@@ -19,9 +19,10 @@ use crate::observation::MasterMode;
 use crate::sim::crystal::Crystal;
 use crate::sim::fault::order::OrderFault;
 use crate::sim::fault::{Faults, What};
+use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{self, Shaft};
 use crate::sim::network::{self, Act, Network, NetworkEvent, Site, Wiring};
-use crate::sim::noise::{JitterSource, LinkJitter, Purpose, Stream};
+use crate::sim::noise::{LinkJitter, Purpose, Stream};
 use crate::sim::queue::Queue;
 use crate::sim::topology::Place;
 use crate::study::plan::{self, Plan};
@@ -171,7 +172,7 @@ pub fn slave_params(scenario: &Scenario, slave: &Slave) -> SlaveParams {
 /// If the scenario breaks a rule that reading it checks.
 pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> {
     let seed = scenario.run.seed;
-    let master = scenario.master;
+    let master = &scenario.master;
     let mut sites = vec![Site {
         machine: Node::Master(master_of(scenario)),
         place: place(scenario, master.address),
@@ -188,15 +189,10 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     }));
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
-    let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
+    let jitter = JitterSource::new(master.gc_jitter.clone(), seed, master.address.get()).expect("a checked jitter");
     let mut network = Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, faults(scenario));
+    order_disturbances(&mut network, scenario);
     order(&mut network, scenario, &scenario.events);
-    for (number, disturbance) in scenario.disturbances.iter().enumerate() {
-        if let What::Order(slaves, fault) = &disturbance.what {
-            let [begin, end] = order_bursts(scenario, slaves, *fault);
-            network.order_bursts(number as u16, &begin, &end);
-        }
-    }
     network
 }
 
@@ -215,6 +211,16 @@ pub fn order<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &
         };
         for &(station, act) in &acts(scenario, &event.slaves, event.action) {
             network.order(when, station, act);
+        }
+    }
+}
+
+/// Tells `network` what the disturbances of `scenario` order of masters.
+pub fn order_disturbances<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &Scenario) {
+    for (number, disturbance) in scenario.disturbances.iter().enumerate() {
+        if let What::Order(slaves, fault) = &disturbance.what {
+            let [begin, end] = order_bursts(scenario, slaves, *fault);
+            network.order_bursts(number as u16, &begin, &end);
         }
     }
 }

@@ -2,6 +2,7 @@
 //! threads and reports.
 
 pub mod acyclic;
+pub mod batch;
 pub mod budget;
 pub mod build;
 pub mod count;
@@ -11,8 +12,11 @@ pub mod episode;
 pub mod event_budget;
 pub mod export;
 pub mod figure;
+pub mod first_fault;
+pub mod flight;
 pub mod gsd;
 pub mod histogram;
+pub mod invocation;
 pub mod layout;
 pub mod live_list;
 pub mod masters;
@@ -30,5 +34,6 @@ pub mod scenario;
 pub mod statistics;
 pub mod summary;
 pub mod topology;
+pub mod trace;
 pub mod verdict;
 pub mod what_if;

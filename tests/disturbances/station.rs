@@ -1,6 +1,10 @@
 //! Stations that fall silent, grow deaf or lose their supply, and a master's application that errs.
 
 use isodp::observation::{ClockVerdict, Disturbance, HandlerState, LifeState, MasterMode, Observation, Phase};
+use isodp::sim::fingerprint::{Fingerprint, Fingerprints};
+use isodp::sim::network::NetworkEvent;
+use isodp::sim::queue::NearQueue;
+use isodp::study::what_if;
 use isodp::time::{Span, Time};
 
 use super::{bursts, changed, disturbed, prints, refused, scene, sends_in, tables};
@@ -206,4 +210,48 @@ fn a_station_that_is_not_there_is_refused() {
     assert!(said.contains("needs either station or stations"), "{said}");
     let one = changed(&[("run.cycles", "10")], &tables(&["kind = \"silent\"; stations = \"all slaves\""]));
     assert_eq!(one.disturbances[0].what.stations().len(), 4);
+}
+
+/// What becomes of two scenarios that part in a cycle.
+fn futures(original: &str, altered: &str, cycle: u64) -> [Fingerprint; 2] {
+    let [original, altered] = [scene(original), scene(altered)];
+    let rider = Fingerprints::new(address(2));
+    let futures = what_if::futures::<NearQueue<NetworkEvent>, _>([&original, &altered], (cycle, None), rider);
+    futures.expect("another future").ends.map(|(_, prints)| prints.total())
+}
+
+#[test]
+fn a_disturbance_of_another_future_is_that_of_a_run_with_it() {
+    for keys in [
+        "kind = \"silent\"; station = 3; cycle = 200; for = 2; every = 50",
+        "kind = \"restart\"; station = 3; at = \"450 ms\"; for = \"50 ms\"; every = \"150 ms\"",
+        "kind = \"crystal-offset\"; stations = \"2..3\"; offset = \"30 ppm\"; at = \"450 ms\"; for = \"50 ms\"",
+        "kind = \"temperature-step\"; station = 4; offset = \"50 ppm\"; time_constant = \"20 ms\"; cycle = 220; for = 40",
+        "kind = \"hold-life-sign\"; stations = \"all slaves\"; cycle = 190; for = 1",
+        "kind = \"gc-jitter\"; shape = \"uniform\"; half_width = \"200 ns\"; cycle = 200; for = 90",
+    ] {
+        let with = tables(&[keys]);
+        let whole = [Run::of(&scene("")).fingerprint, Run::of(&scene(&with)).fingerprint];
+        assert_eq!(futures("", &with, 190), whole, "{keys}");
+        assert_eq!(futures(&with, &with, 190), [whole[1]; 2], "{keys}");
+        assert_ne!(whole[0], whole[1]);
+        // The same one beside another that comes first changes its number alone.
+        let never = tables(&["kind = \"mute\"; station = 6; cycle = 99999; for = 1"]);
+        assert_eq!(futures(&with, &[never, with.clone()].concat(), 230)[1], whole[1], "{keys}");
+    }
+}
+
+#[test]
+fn a_burst_that_another_future_does_not_have_ends_where_it_begins() {
+    let silent = tables(&["kind = \"restart\"; station = 3; cycle = 180; for = 100"]);
+    let ended = tables(&["kind = \"restart\"; station = 3; cycle = 180; for = 20"]);
+    let [original, altered] = futures(&silent, "", 200);
+    assert_eq!(original, Run::of(&scene(&silent)).fingerprint);
+    // It ends at the beginning of the SYNCH of the cycle, not of the cycle: not the very same run.
+    let whole = Run::of(&scene(&ended));
+    assert_ne!(altered, original);
+    let back = |run: &Run| run.phases_of(3).last().map(|&(phase, cycle)| (phase, cycle));
+    assert!(matches!(back(&whole), Some((Phase::Operation, _))));
+    let resumed = tables(&["kind = \"restart\"; station = 3; cycle = 180; for = 100; name = \"again\""]);
+    assert_ne!(futures(&silent, &resumed, 200)[1], altered, "a burst that should go on begins");
 }

@@ -3,6 +3,7 @@
 //! Only the next one is ever known, so that a disturbance which never ends needs no more room than one that comes once.
 
 use crate::sim::fault::window::Window;
+use crate::time::Time;
 
 /// The axis that a window counts on, with a place on it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -27,6 +28,32 @@ impl Turns {
     pub const fn new(window: Window) -> Self {
         Self { window, burst: 0, on: false }
     }
+    /// As seen at `now`, before the cycle of this number begins: a burst that should go on begins next.
+    pub fn from(window: Window, now: Time, cycle: u64) -> Self {
+        let mut turns = Self::new(window);
+        let over = |turn| match turn {
+            Turn::Time(at) => at <= now.ticks(),
+            Turn::Cycle(at) => at <= cycle as i64,
+        };
+        let bursts = match window {
+            Window::Always => return turns,
+            Window::Cycles(bursts) | Window::Time(bursts) => bursts,
+        };
+        let at = if matches!(window, Window::Time(_)) { now.ticks() } else { cycle as i64 };
+        if let (Some(every), true) = (bursts.every, at > bursts.from) {
+            turns.burst = ((at - bursts.from) / every) as u64;
+        }
+        // It may be over already.
+        let ended = Self { on: true, ..turns }.next();
+        if ended.is_some_and(over) {
+            turns.burst += 1;
+        }
+        turns
+    }
+    /// Its window.
+    pub const fn window(&self) -> Window {
+        self.window
+    }
     /// Whether a burst goes on.
     pub const fn is_on(&self) -> bool {
         self.on
@@ -45,15 +72,6 @@ impl Turns {
         };
         let at = if self.on { bursts.end(self.burst) } else { bursts.begin(self.burst) };
         at.map(turn)
-    }
-    /// Leaves out every turn before this tick and before this cycle.
-    pub fn skip(&mut self, tick: i64, cycle: i64) {
-        while self.next().is_some_and(|turn| match turn {
-            Turn::Time(at) => at < tick,
-            Turn::Cycle(at) => at < cycle,
-        }) {
-            self.turn();
-        }
     }
     /// It turns. Whether a burst begins; otherwise one ends.
     pub const fn turn(&mut self) -> bool {
@@ -92,18 +110,16 @@ mod tests {
     }
 
     #[test]
-    fn what_is_past_is_left_out() {
+    fn in_the_middle_of_a_window_the_burst_that_goes_on_begins_next() {
         let bursts = Bursts { from: 4, length: Some(3), every: Some(8), times: Some(2) };
-        for (now, on, next) in [(0, false, Some(4)), (4, false, Some(4)), (5, true, Some(7)), (13, true, Some(15))] {
-            let (mut time, mut cycles) = (Turns::new(Window::Time(bursts)), Turns::new(Window::Cycles(bursts)));
-            time.skip(now, i64::MAX);
-            cycles.skip(i64::MAX, now);
-            assert_eq!((time.is_on(), time.next()), (on, next.map(Turn::Time)), "{now}");
-            assert_eq!((cycles.is_on(), cycles.next()), (on, next.map(Turn::Cycle)), "{now}");
-        }
-        let mut over = Turns::new(Window::Time(bursts));
-        over.skip(100, 0);
-        assert_eq!((over.is_on(), over.next()), (false, None));
+        let next = [0, 4, 6, 7, 11, 12, 14, 15, 99].map(|cycle| {
+            let turns = Turns::from(Window::Cycles(bursts), Time::ZERO, cycle);
+            turns.next().map(|turn| (turns.burst(), turn))
+        });
+        let (first, second) = (Some((0, Turn::Cycle(4))), Some((1, Turn::Cycle(12))));
+        assert_eq!(next, [first, first, first, second, second, second, second, None, None]);
+        let once = Turns::from(Window::Time(Bursts::once(4, None)), Time::from_ticks(100), 0);
+        assert_eq!(once.next(), Some(Turn::Time(4)));
     }
 
     #[test]

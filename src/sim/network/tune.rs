@@ -43,7 +43,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             return;
         }
         tuning.planned = true;
-        let slot = slots.first().copied().unwrap_or(Self::CLOCK);
+        let slot = slots[0];
         self.push(self.now + interval, Phase::Command, slot, Event::Step(index as u16));
     }
     /// Changes what a disturbance makes of its crystals, and their rates with it.
@@ -55,20 +55,27 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             change(pull);
             let change = pull.ppb() - before;
             if change != 0 {
-                self.slots[slot].ppb += change;
+                self.slots[slot].offset.pulled += change;
                 self.tune(slot);
             }
         }
     }
-    /// Gives a station's crystal the rate that it has now.
+    /// Gives a station's crystal the rate that disturbances make of it, once no cycle start waits.
     #[cold]
     pub(super) fn tune(&mut self, index: usize) {
         let slot = &mut self.slots[index];
-        slot.untuned = slot.cycle_at.is_some();
-        if slot.untuned {
-            return;
+        slot.offset.waits = slot.cycle_at.is_some();
+        if !slot.offset.waits {
+            self.set_rate(index);
         }
-        slot.site.crystal.set_rate(self.now, within(slot.ppb)).expect("a rate within bounds");
+    }
+    /// Puts the rate of a station's crystal in force: what the station waits for comes when the crystal shows it.
+    pub(super) fn set_rate(&mut self, index: usize) {
+        let slot = &mut self.slots[index];
+        slot.site
+            .crystal
+            .set_rate(self.now, within(slot.offset.own + slot.offset.pulled))
+            .expect("a rate within bounds");
         for which in 0..Outbox::DEADLINES {
             if let Some((local, _)) = self.slots[index].deadlines[which].due {
                 Self::arm(&mut self.queue, &mut self.slots[index], which, local, self.now);

@@ -21,8 +21,12 @@ use crate::wire::Address;
 pub(super) struct Turning<C> {
     /// Number of the disturbance in the scenario, from 0.
     pub number: u16,
+    name: String,
+    what: What,
     pub turns: Turns,
-    /// Whom it is told of: the stations that it means.
+    /// It is no more among the disturbances: a burst that goes on ends, and no other begins.
+    pub retired: bool,
+    /// Whom it is told of: the stations that it means, or the first station.
     pub slots: Vec<usize>,
     pub effect: Effect<C>,
 }
@@ -45,21 +49,57 @@ pub(super) enum Effect<C> {
 impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Takes in the disturbances that begin and end.
     pub(super) fn disturb(&mut self, all: Vec<fault::Turning>) {
-        for fault::Turning { number, turns, what, pulls, source } in all {
-            let slots = what.stations().iter().filter_map(|&station| self.slot_of(station)).collect();
-            let effect = match what {
-                What::Station(_, StationFault::Restart) => Effect::Supply,
-                What::Crystal(_, fault) => {
-                    Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false })
-                }
-                What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
-                What::Line(_) | What::Source(_) | What::Station(..) => source.map_or(Effect::None, Effect::Source),
-            };
-            self.turning.push(Turning { number, turns, slots, effect });
-            self.plan_turn(self.turning.len() - 1);
+        for disturbance in all {
+            self.add_turning(disturbance);
         }
     }
-    pub(super) fn slot_of(&self, station: Address) -> Option<usize> {
+    /// From now on these are the disturbances that begin and end. One that was there before goes on as it is, any other
+    /// begins where its window is now.
+    pub(super) fn turn_over(&mut self, all: Vec<fault::Turning>) {
+        let known = |turning: &Turning<_>, new: &fault::Turning| {
+            !turning.retired
+                && (&turning.name, &turning.what) == (&new.name, &new.what)
+                && turning.turns.window() == new.turns.window()
+        };
+        for index in 0..self.turning.len() {
+            match all.iter().find(|new| known(&self.turning[index], new)) {
+                Some(new) => self.turning[index].number = new.number,
+                None => self.retire(index),
+            }
+        }
+        for mut new in all {
+            if !self.turning.iter().any(|turning| known(turning, &new)) {
+                new.turns = Turns::from(new.turns.window(), self.now, self.clocks);
+                self.add_turning(new);
+            }
+        }
+    }
+    fn add_turning(&mut self, new: fault::Turning) {
+        let fault::Turning { number, name, turns, what, pulls, source } = new;
+        let mut slots: Vec<_> = what.stations().iter().filter_map(|&station| self.slot_of(station)).collect();
+        if slots.is_empty() {
+            slots.push(Self::CLOCK);
+        }
+        let effect = match what {
+            What::Station(_, StationFault::Restart) => Effect::Supply,
+            What::Crystal(_, fault) => Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false }),
+            What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
+            What::Line(_) | What::Source(_) | What::Station(..) | What::Clock(..) => {
+                source.map_or(Effect::None, Effect::Source)
+            }
+        };
+        self.turning.push(Turning { number, name, what, turns, retired: false, slots, effect });
+        self.plan_turn(self.turning.len() - 1);
+    }
+    fn retire(&mut self, index: usize) {
+        let Turning { turns, retired, slots, .. } = &mut self.turning[index];
+        *retired = true;
+        if turns.is_on() {
+            let slot = slots[0];
+            self.push(self.now, Phase::Command, slot, Event::Turn(index as u16));
+        }
+    }
+    fn slot_of(&self, station: Address) -> Option<usize> {
         self.by_address[usize::from(station.get())].map(usize::from)
     }
     /// What the disturbance of this number, from 0, orders when a burst begins and when one ends.
@@ -77,9 +117,12 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// Sees to it that the disturbance turns next when it has to.
-    pub(super) fn plan_turn(&mut self, index: usize) {
-        let Turning { turns, slots, .. } = &self.turning[index];
-        let slot = slots.first().copied().unwrap_or(Self::CLOCK);
+    fn plan_turn(&mut self, index: usize) {
+        let Turning { turns, slots, retired, .. } = &self.turning[index];
+        if *retired {
+            return;
+        }
+        let slot = slots[0];
         match turns.next() {
             None => {}
             Some(Turn::Cycle(cycle)) => self.next_turn = self.next_turn.min(cycle as u64),
@@ -94,6 +137,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     pub(super) fn turn_in_cycle<R: Recorder>(&mut self, cycle: u64, recorder: &mut R) {
         self.next_turn = u64::MAX;
         for index in 0..self.turning.len() {
+            if self.turning[index].retired {
+                continue;
+            }
             let due = |turns: &Turns| matches!(turns.next(), Some(Turn::Cycle(at)) if at as u64 <= cycle);
             while due(&self.turning[index].turns) {
                 self.turn(index, recorder);
@@ -106,16 +152,20 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// A burst begins or ends.
     #[cold]
     pub(super) fn turn<R: Recorder>(&mut self, index: usize, recorder: &mut R) {
-        let on = self.turning[index].turns.turn();
+        let Turning { turns, retired, .. } = &mut self.turning[index];
+        if *retired && !turns.is_on() {
+            return;
+        }
+        let on = turns.turn();
         let number = self.turning[index].number;
         let how = if on { Disturbance::Begins } else { Disturbance::Ends };
         for place in 0..self.turning[index].slots.len() {
             let slot = self.turning[index].slots[place];
             self.tell(slot, &Observation::Disturbed { number, how }, recorder);
             if let Effect::Supply = self.turning[index].effect {
-                let outages = &mut self.slots[slot].outages;
+                let outages = &mut self.slots[slot].supply.outages;
                 *outages = if on { *outages + 1 } else { *outages - 1 };
-                self.supply(slot, recorder);
+                self.update_supply(slot, recorder);
             }
         }
         match self.turning[index].effect {

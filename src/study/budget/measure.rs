@@ -7,8 +7,8 @@ use crate::sim::network::{Network, NetworkEvent};
 use crate::sim::queue::NearQueue;
 use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::study::build;
+use crate::study::event_budget::{EventBudget, NoHeadway};
 use crate::study::histogram::Histogram;
-use crate::study::run::until;
 use crate::study::scenario::{Scenario, Slave};
 use crate::time::{Local, Span, Time};
 use crate::wire::Address;
@@ -19,8 +19,6 @@ pub const SETTLING: u64 = 64;
 /// Largest error that has a place in the histogram. Model: a quarter of the longest T_DP (32 ms), beyond which no window
 /// reaches.
 const LIMIT: Span = Span::from_ms(8);
-/// Events between two looks at the end.
-const STRIDE: u64 = 1_000_000;
 
 /// The errors of one slave in one variant.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -48,11 +46,14 @@ pub fn clocked(scenario: &Scenario) -> impl Iterator<Item = &Slave> {
 }
 
 /// Runs `scenario`: what each slave with a clock makes of it, in address order.
-pub fn measure(scenario: &Scenario) -> Vec<Measured> {
+///
+/// # Errors
+/// The run makes no headway.
+pub fn measure(scenario: &Scenario) -> Result<Vec<Measured>, NoHeadway> {
     let mut network: Network<Node, NearQueue<NetworkEvent>> = build::network(scenario);
     let mut errors = Errors::of(scenario);
-    while !network.run(until(scenario), STRIDE, &mut errors) {}
-    errors.watches.iter().map(Watch::measured).collect()
+    EventBudget::of(scenario).run(&mut network, scenario, &mut errors, |_| ())?;
+    Ok(errors.watches.iter().map(Watch::measured).collect())
 }
 
 /// Reads the run.

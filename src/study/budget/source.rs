@@ -1,6 +1,6 @@
 //! Sources: what makes the instant of SYNCH at an encoder differ from its prediction, and how each is switched off.
 
-use crate::sim::noise::GcJitter;
+use crate::sim::jitter::GcJitter;
 use crate::study::scenario::{Crystal, Scenario, Topology};
 use crate::time::Span;
 
@@ -39,7 +39,9 @@ fn has_repeater_jitter(scenario: &Scenario) -> bool {
 }
 fn without_repeater_jitter(scenario: &mut Scenario) {
     let mut repeaters = scenario.topology.repeaters().to_vec();
-    repeaters.iter_mut().for_each(|repeater| repeater.jitter = Span::ZERO);
+    for repeater in &mut repeaters {
+        repeater.jitter = Span::ZERO;
+    }
     scenario.topology =
         Topology::new(scenario.topology.segments().to_vec(), repeaters).expect("the tree it was before");
 }
@@ -52,12 +54,16 @@ fn has_crystals(scenario: &Scenario) -> bool {
 }
 fn without_crystals(scenario: &mut Scenario) {
     scenario.master.crystal = NONE;
-    scenario.slaves.iter_mut().for_each(|slave| slave.crystal = NONE);
+    for slave in &mut scenario.slaves {
+        slave.crystal = NONE;
+    }
 }
 
 fn has_quantum(scenario: &Scenario) -> bool {
     scenario.slaves.iter().any(|slave| slave.options.pll.quantum > FINEST)
 }
 fn without_quantum(scenario: &mut Scenario) {
-    scenario.slaves.iter_mut().for_each(|slave| slave.options.pll.quantum = FINEST);
+    for slave in &mut scenario.slaves {
+        slave.options.pll.quantum = FINEST;
+    }
 }

@@ -83,6 +83,7 @@ pub(super) fn meta(scenario: &Scenario) -> PlotMeta {
         slaves: scenario.configured().map(|slave| slave.address).collect(),
         links: scenario.links.iter().map(|link| (link.publisher, link.subscriber)).collect(),
         masters: 1,
+        disturbances: Vec::new(),
         duration: match scenario.run.duration {
             Extent::Time(span) => span,
             Extent::Cycles(cycles) => t_dp.checked_mul(cycles as i64).unwrap_or(Span::MAX),

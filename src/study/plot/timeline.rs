@@ -33,15 +33,15 @@ const LIFE_FAULT: u16 = 0x0F02;
 const CLOCK_FAULT: u16 = 0x0F04;
 
 /// What is marked: its words, its colour, and the upper and lower end of the mark in halves of a lane.
-struct Mark {
-    label: &'static str,
+pub(super) struct Mark {
+    pub(super) label: &'static str,
     column: &'static str,
-    colour: RGBColor,
+    pub(super) colour: RGBColor,
     from: i32,
     to: i32,
 }
 
-const MARKS: [Mark; 5] = [
+pub(super) const MARKS: [Mark; 5] = [
     Mark { label: "fault 0F04, clock", column: "0F04", colour: VERMILION, from: 0, to: 2 },
     Mark { label: "fault 0F02, sign of life", column: "0F02", colour: BLACK, from: 0, to: 2 },
     Mark { label: "another fault", column: "other", colour: BLUE, from: 0, to: 2 },
@@ -52,7 +52,7 @@ const MARKS: [Mark; 5] = [
 const TROUBLES: [&str; 6] = ["disturbed", "collision", "SYNCH late", "no answer", "sign of life held", "supply off"];
 
 /// Colour and name of each phase.
-const PHASES: [(Phase, RGBColor); 5] = [
+pub(super) const PHASES: [(Phase, RGBColor); 5] = [
     (Phase::Configuration, RGBColor(0xB8, 0xB8, 0xB8)),
     (Phase::Clock, ORANGE),
     (Phase::MasterLife, RGBColor(0xF0, 0xE4, 0x42)),

@@ -504,7 +504,7 @@ fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
         let named = match &disturbance.what {
             What::Line(LineFault { which: Which { from, to, .. }, .. }) => [("from", *from), ("to", *to)],
             What::Source(source) => [("near", source.near), ("near", None)],
-            What::Station(..) | What::Crystal(..) | What::Order(..) => continue,
+            What::Station(..) | What::Crystal(..) | What::Order(..) | What::Clock(..) => continue,
         };
         for (key, station) in named {
             if let Some(address) = station

@@ -3,6 +3,7 @@
 
 pub(super) mod application;
 pub(super) mod clock;
+mod gc_jitter;
 mod line;
 mod manner;
 mod source;
@@ -60,6 +61,7 @@ pub const DISTURBANCES: &[DisturbanceKind] = &[
     station::MUTE,
     station::DEAF,
     station::RESTART,
+    gc_jitter::GC_JITTER,
     clock::CRYSTAL_OFFSET,
     clock::CRYSTAL_WANDER,
     clock::TEMPERATURE_STEP,

@@ -76,6 +76,8 @@ pub fn beta_quantile(a: f64, b: f64, p: Share) -> Share {
 fn lower_half(a: f64, b: f64, p: Share) -> f64 {
     /// Steps that suffice even if each only halves the exponent of x.
     const STEPS: u32 = 200;
+    /// Newton's steps double the digits: after one so small, relative to x, all of them are right.
+    const SMALL: f64 = 1e-9;
     let upper = p.x > 0.5;
     let tail = |x: Share| if upper { beta_cdf(b, a, x.turned()) } else { beta_cdf(a, b, x) };
     let (wanted, sign) = if upper { (p.rest, -1.0) } else { (p.x, 1.0) };
@@ -94,14 +96,17 @@ fn lower_half(a: f64, b: f64, p: Share) -> f64 {
             high = x;
         }
         let slope = weight(a, b, share) / (share.rest * found);
-        let mut next = x * libm::exp(-off / slope);
-        if !(low < next && next < high) {
-            next = if low > 0.0 { (low * high).sqrt() } else { high / 1024.0 };
+        let next = x * libm::exp(-off / slope);
+        if (next - x).abs() <= SMALL * x {
+            return next.clamp(low, high);
         }
-        if (next - x).abs() <= x * f64::EPSILON || next <= f64::MIN_POSITIVE {
-            return next;
-        }
-        x = next;
+        x = if low < next && next < high {
+            next
+        } else if low > 0.0 {
+            (low * high).sqrt()
+        } else {
+            high / 1024.0
+        };
     }
     x
 }

@@ -26,7 +26,7 @@ pub(super) const KEYS: &str = "master.gc_jitter, crystal (of master, slave.N, cl
 /// `altered` with the world of `original`: where it is not `original`, something else differs.
 fn in_the_old_world(original: &Scenario, altered: &Scenario) -> Scenario {
     let mut other = altered.clone();
-    other.master.gc_jitter = original.master.gc_jitter;
+    other.master.gc_jitter.clone_from(&original.master.gc_jitter);
     other.master.crystal = original.master.crystal;
     for (slave, old) in other.slaves.iter_mut().zip(&original.slaves) {
         slave.crystal = old.crystal;
@@ -73,10 +73,11 @@ pub(super) fn same_past(original: &Scenario, altered: &Scenario, now: Time, cycl
 /// If a scenario breaks a rule that reading it checks.
 pub(super) fn change_line<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, [original, altered]: [&Scenario; 2]) {
     if altered.master.gc_jitter != original.master.gc_jitter {
-        network.change_jitter(altered.master.gc_jitter).expect("a checked jitter");
+        network.change_jitter(altered.master.gc_jitter.clone()).expect("a checked jitter");
     }
     if altered.disturbances != original.disturbances {
         network.set_faults(build::faults(altered));
+        build::order_disturbances(network, altered);
     }
 }
 
