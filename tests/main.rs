@@ -29,5 +29,6 @@ mod startup;
 mod statistics;
 mod support;
 mod swarm;
+mod sweep;
 mod topology;
 mod what_if;

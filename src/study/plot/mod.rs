@@ -20,6 +20,7 @@ pub mod plan;
 mod pll_convergence;
 mod position;
 mod publish_latency;
+pub mod sweep;
 mod synch_delay;
 mod t_dp_deviation;
 mod telegrams;

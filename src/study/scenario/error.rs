@@ -63,7 +63,7 @@ impl Fault {
 
 impl ScenarioError {
     /// An error about a whole file.
-    pub(super) fn about_file(source: &str, fault: Fault) -> Self {
+    pub(in crate::study) fn about_file(source: &str, fault: Fault) -> Self {
         Self { problems: vec![Problem { source: source.into(), position: None, key: String::new(), fault }] }
     }
 }
