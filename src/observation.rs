@@ -720,7 +720,7 @@ pub enum Observation {
     },
     /// An order of the scenario came while this station had no supply.
     OrderLost,
-    /// The scenario disturbed this station, or a telegram of it.
+    /// The scenario disturbed this station, a telegram of it, or the line at its place.
     Disturbed {
         /// Number of the disturbance in the scenario, from 0.
         number: u16,
@@ -730,7 +730,7 @@ pub enum Observation {
 }
 
 named! {
-    /// What the scenario did to one telegram, or to a station.
+    /// What the scenario did to one telegram, to a station, or put on the line at its place.
     Disturbance {
         /// A burst of a disturbance begins.
         Begins = "begins",
@@ -744,6 +744,10 @@ named! {
         Doubled = "telegram doubled",
         /// Some of its bits are wrong.
         WrongBits = "wrong bits",
+        /// Characters without sense came onto the line.
+        Noise = "noise",
+        /// A telegram of nobody came onto the line.
+        Foreign = "foreign telegram",
     }
 }
 

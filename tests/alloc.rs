@@ -93,6 +93,10 @@ fn disturbances_of_the_line_allocate_nothing() {
         "kind = \"duplicate-telegrams\"\nrate = \"5 %\"\nservice = \"replies\"",
         "kind = \"bit-errors\"\nrate = \"1e-5\"",
         "kind = \"wrong-octet\"\noctet = 8\nflip = 3\nrate = \"1 %\"\nto = 4",
+        "kind = \"noise\"\nmean = \"5 ms\"\noctets_to = 4",
+        "kind = \"noise\"\ncycle = 0\nfor = 1\nevery = 30\nafter = \"30 us\"",
+        "kind = \"foreign-telegram\"\nat = \"1 ms\"\nfor = \"1 ms\"\nevery = \"41 ms\"\ndata = { to = 4, from = 9, fc = 0x49 }",
+        "kind = \"late-token\"\nstation = 12\nby = \"20 us\"\ncycle = 1\nfor = 10\nevery = 25",
     ] {
         text += "\n[[disturbance]]\n";
         text += keys;

@@ -1,11 +1,12 @@
 //! Disturbances of the line in whole networks: each at full strength, and at none.
 
-use isodp::observation::{Disturbance, Observation};
+use isodp::observation::{ClockVerdict, Disturbance, Observation};
+use isodp::study::row::EventRow;
 use isodp::study::scenario::Scenario;
 use isodp::time::{Span, Time};
 use isodp::wire::Address;
 
-use crate::support::{Run, address};
+use crate::support::{Run, address, scenario};
 
 /// An isochronous master with two encoders.
 const NETWORK: &str = r#"
@@ -83,6 +84,9 @@ fn without_strength_nothing_changes() {
         "kind = \"bit-errors\"; rate = \"0\"",
         "kind = \"wrong-octet\"; octet = 250",
         "kind = \"bit-errors\"; rate = \"1\"; cycle = 1000",
+        "kind = \"noise\"; cycle = 1000",
+        "kind = \"noise\"; mean = \"1 us\"; at = \"20 s\"",
+        "kind = \"foreign-telegram\"; token = { to = 4, from = 3 }; at = \"20 s\"",
     ] {
         let run = with(keys);
         assert_eq!((run.fingerprint, run.stations), (clean.fingerprint, clean.stations.clone()), "{keys}");
@@ -225,4 +229,152 @@ fn two_wrong_octets_that_leave_the_sum_as_it_was_pass() {
     let run = Run::of(&read(&wrong(20)));
     // After the first one the slave gets no repeat until it answers.
     assert_eq!(count(&run, |seen| matches!(seen, Observation::NoAnswer { .. })), 10, "the sum alone is wrong");
+}
+
+/// Octets of telegrams that a disturbance put on the line at a station's place.
+fn foreign(run: &Run, station: u8, octets: &[u8]) -> Vec<Time> {
+    let same = run.telegrams.iter().filter(|(_, _, who, found)| *who == address(station) && found == octets);
+    same.map(|(start, ..)| *start).collect()
+}
+
+#[test]
+fn noise_comes_as_often_as_said_and_hits_what_is_on_the_line() {
+    let run = with("kind = \"noise\"; mean = \"500 us\"; octets = 1; octets_to = 3; cycle = 100; for = 100; near = 4");
+    // 200 in 100 ms, give or take 14.
+    let noise = disturbed(&run, 4, Disturbance::Noise);
+    assert!((150..250).contains(&noise), "{noise}");
+    // Telegrams are on the line for 85 us of 1000, and noise of 22 bits on the average too.
+    let hits = collisions(&run);
+    assert!((10..100).contains(&hits), "{hits}");
+    assert!(retries(&run) > 0, "a hit request or reply is repeated");
+    let quiet = run.cycles.iter().filter(|row| row.cycle > 201 && row.cycle < 299);
+    assert!(quiet.into_iter().all(|row| row.retries == 0));
+}
+
+#[test]
+fn noise_in_the_idle_time_before_a_request_keeps_it_from_being_heard() {
+    // The first request begins T_ID2 of 800 t_bit, 66.67 us, after t0. A character of noise is 11 t_bit long: begun up to
+    // 63 us after t0 it leaves the 33 t_bit of T_SYN.
+    for (after, lost) in [("8 us", false), ("62.9 us", false), ("63.1 us", true), ("65.7 us", true)] {
+        let keys = format!("kind = \"noise\"; after = \"{after}\"; cycle = 100; for = 1; every = 10; times = 5");
+        let run = with(&keys);
+        assert_eq!((disturbed(&run, 2, Disturbance::Noise), collisions(&run)), (5, 0));
+        assert_eq!(retries(&run), if lost { 5 } else { 0 }, "{after}");
+    }
+}
+
+#[test]
+fn noise_is_a_stranger_to_the_station_at_whose_place_it_is() {
+    // In the middle of the wait for an answer the master takes it for one.
+    let run = with("kind = \"noise\"; after = \"79 us\"; cycle = 100; for = 1; every = 10; times = 5");
+    assert!(retries(&run) >= 5, "{}", retries(&run));
+}
+
+#[test]
+fn a_foreign_telegram_is_answered_by_whom_it_asks() {
+    // FDL status of slave 4, asked by nobody in the idle part of the cycle.
+    let keys = "data = { to = 4, from = 9, fc = 0x49 }; after = \"800 us\"; cycle = 100; for = 1; every = 10; times = 3; near = 3";
+    let run = with(&format!("kind = \"foreign-telegram\"; {keys}"));
+    let (asked, answered) =
+        (foreign(&run, 3, &[0x10, 4, 9, 0x49, 0x56, 0x16]), foreign(&run, 4, &[0x10, 9, 4, 0, 13, 0x16]));
+    assert_eq!((asked.len(), answered.len(), disturbed(&run, 3, Disturbance::Foreign)), (3, 3, 3));
+    assert!(asked.iter().zip(&answered).all(|(asked, answered)| asked < answered));
+}
+
+#[test]
+fn a_foreign_token_takes_the_token_away() {
+    // A master that is not there passes the token to one that is not there either.
+    let run =
+        with("kind = \"foreign-telegram\"; token = { to = 6, from = 9 }; after = \"800 us\"; cycle = 100; for = 1");
+    let gone = |seen: &Observation| matches!(seen, Observation::TokenDropped { .. });
+    assert_eq!((count(&run, gone), foreign(&run, 2, &[0xDC, 6, 9]).len()), (1, 1));
+    let claimed = count(&run, |seen| matches!(seen, Observation::TokenClaimed));
+    assert_eq!(claimed, 2, "after T_TO of silence the master claims it again");
+}
+
+// ----- shipped scenarios
+
+/// The scenarios of this module with their tests.
+pub(crate) const TESTS: &[(&str, fn())] =
+    &[("bit-errors", bit_errors), ("burst-noise", burst_noise), ("late-token", late_token)];
+
+fn missing_clocks(run: &Run, slave: u8) -> Vec<u64> {
+    let missing = |seen: &Observation| matches!(seen, Observation::Clock { verdict: ClockVerdict::Missing, .. });
+    run.events_of(slave).filter(|row| missing(&row.what)).map(|row| row.cycle).collect()
+}
+/// No slave reports a fault or leaves data exchange.
+fn assert_unharmed(run: &Run) {
+    assert_eq!(count(run, |seen| matches!(seen, Observation::Fault { .. } | Observation::Lost { .. })), 0);
+}
+
+#[test]
+fn bit_errors() {
+    let run = Run::of(&scenario("bit-errors", &[]));
+    let wrong = count(&run, |seen| matches!(seen, Observation::Disturbed { how: Disturbance::WrongBits, .. }));
+    assert!((90..160).contains(&wrong), "{wrong}");
+    let (repeated, unanswered) = (retries(&run), count(&run, |seen| matches!(seen, Observation::NoAnswer { .. })));
+    let clocks = missing_clocks(&run, 3).len();
+    assert!((1..=16).contains(&clocks), "{clocks}");
+    assert!(repeated + clocks <= wrong && repeated + clocks + 30 > wrong, "{repeated} {clocks} of {wrong}");
+    assert!(unanswered < 10, "{unanswered}");
+    assert_unharmed(&run);
+    // Every set point and every position came as it was sent: the shafts stand at 0.
+    let positions = |what: &Observation| match what {
+        Observation::Latch { inputs, .. } => Some(inputs.xist1),
+        _ => None,
+    };
+    assert!(run.observations.iter().filter_map(|(_, _, seen)| positions(seen)).all(|position| position == 0));
+    assert_eq!(count(&run, |seen| matches!(seen, Observation::IllegalAnswer { .. })), 0);
+}
+
+#[test]
+fn burst_noise() {
+    let run = Run::of(&scenario("burst-noise", &[]));
+    let noise = disturbed(&run, 5, Disturbance::Noise);
+    assert!((340..460).contains(&noise), "{noise}");
+    let hits = collisions(&run);
+    assert!((noise / 12..noise / 4).contains(&hits), "{hits} of {noise}");
+    assert!(retries(&run) > 15);
+    for slave in 3..=8 {
+        let missing = missing_clocks(&run, slave);
+        assert_eq!(missing.len(), 3, "{missing:?}");
+        assert!(missing.iter().all(|cycle| cycle % 300 <= 6), "{missing:?}");
+    }
+    assert_unharmed(&run);
+    // After each burst it is quiet again.
+    let quiet = run.cycles.iter().filter(|row| row.cycle > 60 && row.cycle % 300 > 6);
+    assert!(quiet.into_iter().all(|row| row.retries == 0));
+    let last = |slave| run.row(slave, 1_400);
+    assert!((3..=8).all(|slave| last(slave).clock_counter == 0));
+}
+
+#[test]
+fn late_token() {
+    let scenario_ = scenario("late-token", &[]);
+    let run = Run::of(&scenario_);
+    let late = |seen: &Observation| match seen {
+        Observation::ClockLate { by } => Some(*by),
+        _ => None,
+    };
+    let late: Vec<_> = run.events_of(2).filter_map(|row| Some((row.cycle, late(&row.what)?))).collect();
+    assert_eq!(late.iter().map(|(cycle, _)| *cycle).collect::<Vec<_>>(), [301, 500]);
+    let near = |by: Span, us| (by - Span::from_us(us)).abs() < Span::from_us(1);
+    assert!(near(late[0].1, 92) && near(late[1].1, 133), "{late:?}");
+    let claimed = |seen: &Observation| matches!(seen, Observation::TokenClaimed);
+    assert_eq!(count(&run, claimed), 2, "at the start, and once for the token that was kept too long");
+    let dropped = |row: &&EventRow| matches!(row.what, Observation::TokenDropped { .. } | Observation::RingLeft { .. });
+    assert_eq!(run.events_of(12).filter(dropped).count(), 2);
+    let entered: Vec<_> =
+        run.events_of(12).filter(|row| matches!(row.what, Observation::RingEntered)).map(|row| row.cycle).collect();
+    assert!(entered.len() == 2 && entered[1] < 520, "{entered:?}");
+    for slave in 4..=6 {
+        assert_eq!(missing_clocks(&run, slave).len(), 2);
+        let stray = |row: &&EventRow| matches!(row.what, Observation::Clock { verdict: ClockVerdict::Stray, .. });
+        assert_eq!(run.events_of(slave).filter(stray).count(), 2);
+    }
+    assert_unharmed(&run);
+    assert_eq!(
+        scenario_.disturbances.iter().map(|one| one.name.as_str()).collect::<Vec<_>>(),
+        ["slow master", "slower master"]
+    );
 }

@@ -3,12 +3,29 @@
 //! A telegram reaches a listener after the delay of the path between the two. Where a link on the path has jitter, each
 //! telegram draws once from that link's stream, however many listen: whoever is behind the link hears the same.
 
+use crate::fdl::Route;
 use crate::sim::cut::Cuts;
 use crate::sim::noise::LinkJitter;
 use crate::sim::record::Origin;
 use crate::sim::topology::Delays;
 use crate::time::{Span, Time};
 use crate::wire::Frame;
+
+/// What is to be known of a telegram on the line beside its characters.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Mark {
+    /// How it came onto the line.
+    pub origin: Origin,
+    /// A character of it is broken, so that every receiver drops it and only knows that something was on the line.
+    pub broken: bool,
+    /// The station at whose place it begins has not sent it, and hears it as all others do.
+    pub apart: bool,
+}
+
+impl Mark {
+    /// A good telegram of its sender.
+    pub const OWN: Self = Self { origin: Origin::Sender, broken: false, apart: false };
+}
 
 /// A telegram on the line.
 #[derive(Clone, Debug)]
@@ -25,10 +42,8 @@ pub struct Flight {
     strays: Vec<Span>,
     /// The characters.
     pub frame: Frame,
-    /// How it came onto the line.
-    pub origin: Origin,
-    /// A character of it is broken, so that every receiver drops it and only knows that something was on the line.
-    pub broken: bool,
+    /// What is to be known of it.
+    pub mark: Mark,
     /// Listeners that have not heard its end yet.
     listeners: u16,
 }
@@ -47,6 +62,7 @@ struct Sent {
     end: Time,
     sender: usize,
     strays: Vec<Span>,
+    apart: bool,
 }
 
 /// The bus.
@@ -62,8 +78,10 @@ pub struct Bus {
     /// The telegrams sent last, each at the place of its number.
     recent: Vec<Sent>,
     cuts: Cuts,
-    /// End of the telegram that ends last of all.
-    busy_until: Time,
+    /// From here on nothing is on the line, and a telegram may begin.
+    clear_from: Time,
+    /// T_SYN.
+    t_syn: Span,
 }
 
 impl Bus {
@@ -77,7 +95,8 @@ impl Bus {
             sent: 0,
             recent: Vec::new(),
             cuts: Cuts::none(),
-            busy_until: Time::ZERO,
+            clear_from: Time::ZERO,
+            t_syn: Span::ZERO,
         }
     }
     /// The same whose cables may be cut.
@@ -105,7 +124,7 @@ impl Bus {
                 let both = (flight.start.max(sent.start).max(now), flight.end.min(sent.end));
                 cuts.part_by(before, a, b) && !cuts.part(a, b) && both.0 < both.1
             };
-            flight.broken |= recent.iter().any(meets);
+            flight.mark.broken |= recent.iter().any(meets);
         }
     }
     /// Whether a telegram that ends at `listener` now has come there whole.
@@ -125,66 +144,82 @@ impl Bus {
         &self.delays
     }
 
-    /// Puts a telegram of `sender` on the line; `broken` tells that a character of it is. Returns its name, and the station
-    /// it overlaps with, if any.
+    /// The same bus with this T_SYN: so long the line has to be idle before a request or a token, or receivers miss it. Stations
+    /// see to it, what comes from nowhere does not.
+    #[must_use]
+    pub const fn with_t_syn(mut self, t_syn: Span) -> Self {
+        self.t_syn = t_syn;
+        self
+    }
+
+    /// Puts a telegram of `sender`, or at its place, on the line. Returns its name, and the station it overlaps with, if any.
     pub fn send(
         &mut self,
         sender: usize,
         (start, end): (Time, Time),
         frame: &Frame,
-        (origin, broken): (Origin, bool),
+        mark: Mark,
     ) -> (FlightId, Option<usize>) {
         let id = self.free.pop().unwrap_or_else(|| {
             let (strays, frame) = (Vec::new(), Frame::new());
-            let flight = Flight { start, end, sender, number: 0, strays, frame, origin, broken, listeners: 0 };
+            let flight = Flight { start, end, sender, number: 0, strays, frame, mark, listeners: 0 };
             self.flights.push(flight);
             FlightId(self.flights.len() as u16 - 1)
         });
         let flight = &mut self.flights[usize::from(id.0)];
         flight.frame.copy_from(frame);
         (flight.start, flight.end, flight.sender, flight.listeners) = (start, end, sender, 0);
-        (flight.origin, flight.broken) = (origin, broken);
+        flight.mark = mark;
         flight.number = self.sent;
         if !self.jitter.is_empty() {
             flight.strays.clear();
             flight.strays.extend(self.jitter.iter_mut().map(LinkJitter::draw));
         }
-        let hit = if start < self.busy_until { self.collide(id) } else { None };
+        let hit = if start < self.clear_from { self.collide(id) } else { None };
         self.remember(id);
         self.sent += 1;
-        self.busy_until = self.busy_until.max(end);
+        self.clear_from = self.clear_from.max(if mark.apart { end + self.t_syn } else { end });
         (id, hit)
     }
-    /// Overlapping characters fail their parity, and so receivers drop all telegrams that overlap with this one. Returns
-    /// the sender of one of them, the one that ends last.
+    /// Overlapping characters fail their parity, and so receivers drop all telegrams that overlap with this one. What is
+    /// apart spoils the idle time before a request too. Returns the sender of one that overlaps, the one that ends last.
     #[cold]
     fn collide(&mut self, id: FlightId) -> Option<usize> {
-        let Flight { start, end, sender, .. } = self.flights[usize::from(id.0)];
-        let Self { flights, recent, cuts, .. } = self;
+        let Flight { start, end, sender, mark, ref frame, .. } = self.flights[usize::from(id.0)];
+        let needs_idle = begins_with_idle(frame.octets());
+        let Self { flights, recent, cuts, t_syn, .. } = self;
+        let t_syn = *t_syn;
         let overlaps =
             |(from, to): (Time, Time), other: usize| from < to && start < to && from < end && !cuts.part(sender, other);
         // What listeners wait for, however long ago it was sent.
         for other in flights.iter_mut().filter(|other| other.listeners > 0 && !other.frame.is_empty()) {
-            other.broken |= overlaps((other.start, other.end), other.sender);
+            let spoilt = mark.apart && begins_with_idle(other.frame.octets());
+            let end = if spoilt { end + t_syn } else { end };
+            other.mark.broken |= start < other.end && other.start < end && !cuts.part(sender, other.sender);
         }
         // One that was cut off before it began is as long as nothing.
         let others = recent.iter().filter(|sent| overlaps((sent.start, sent.end), sent.sender));
         let hit = others.max_by_key(|sent| sent.end).map(|sent| sent.sender);
-        self.flights[usize::from(id.0)].broken |= hit.is_some();
+        let spoils = |sent: &Sent| {
+            let too_soon = start >= sent.end && start < sent.end + t_syn;
+            sent.apart && needs_idle && too_soon && !cuts.part(sender, sent.sender)
+        };
+        let broken = hit.is_some() || recent.iter().any(spoils);
+        flights[usize::from(id.0)].mark.broken |= broken;
         hit
     }
     /// Keeps the telegram for [`Self::is_busy`] instead of the oldest kept.
     fn remember(&mut self, id: FlightId) {
         let kept = self.kept();
-        let &Flight { start, end, sender, ref strays, .. } = &self.flights[usize::from(id.0)];
+        let &Flight { start, end, sender, ref strays, mark: Mark { apart, .. }, .. } = &self.flights[usize::from(id.0)];
         match self.recent.get_mut(self.sent as usize % kept) {
             Some(kept) => {
-                (kept.start, kept.end, kept.sender) = (start, end, sender);
+                (kept.start, kept.end, kept.sender, kept.apart) = (start, end, sender, apart);
                 if !strays.is_empty() {
                     kept.strays.clone_from(strays);
                 }
             }
-            None => self.recent.push(Sent { start, end, sender, strays: strays.clone() }),
+            None => self.recent.push(Sent { start, end, sender, strays: strays.clone(), apart }),
         }
     }
     /// The station `sender` lost its supply at `now`: what it would have sent later never reaches the line. What is
@@ -246,13 +281,18 @@ impl Bus {
     }
 }
 
+/// Whether receivers take this telegram only after an idle line: what the holder of the token sends (EN 50170-2, T_SYN).
+fn begins_with_idle(octets: &[u8]) -> bool {
+    /// SD4.
+    const TOKEN: u8 = 0xDC;
+    octets.first() == Some(&TOKEN) || Route::of(octets).is_some_and(|route| !route.reply)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::sim::topology::{CABLE_DELAY, Link, Place, Tree, cable_delay};
     use crate::wire::Address;
-
-    const GOOD: (Origin, bool) = (Origin::Sender, false);
 
     fn token() -> Frame {
         let mut frame = Frame::new();
@@ -272,24 +312,24 @@ mod tests {
     #[test]
     fn telegrams_that_overlap_are_both_garbled_and_those_that_follow_are_not() {
         let mut bus = line();
-        let (a, clean) = bus.send(0, (ns(0), ns(100)), &token(), GOOD);
+        let (a, clean) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
         bus.add_listeners(a, 1);
-        let (b, hit) = bus.send(1, (ns(99), ns(199)), &token(), GOOD);
+        let (b, hit) = bus.send(1, (ns(99), ns(199)), &token(), Mark::OWN);
         bus.add_listeners(b, 1);
         assert_eq!((clean, hit), (None, Some(0)));
         for id in [a, b] {
-            assert!(bus.flight(id).broken);
+            assert!(bus.flight(id).mark.broken);
             bus.heard(id);
         }
-        let (c, hit) = bus.send(0, (ns(199), ns(299)), &token(), GOOD);
-        assert_eq!((hit, bus.flight(c).broken), (None, false));
+        let (c, hit) = bus.send(0, (ns(199), ns(299)), &token(), Mark::OWN);
+        assert_eq!((hit, bus.flight(c).mark.broken), (None, false));
     }
 
     #[test]
     fn a_telegram_that_is_hit_twice_is_as_broken_and_one_that_fits_before_another_is_not_hit() {
         let mut bus = line();
         let mut put = |sender, from, to| {
-            let (id, hit) = bus.send(sender, (ns(from), ns(to)), &token(), GOOD);
+            let (id, hit) = bus.send(sender, (ns(from), ns(to)), &token(), Mark::OWN);
             bus.add_listeners(id, 1);
             (id, hit)
         };
@@ -297,38 +337,61 @@ mod tests {
         assert_eq!(sent.map(|(_, hit)| hit), [None, Some(0), Some(1), None, None]);
         let long = put(0, 900, 2_000);
         assert_eq!(long.1, Some(1));
-        let all = sent.map(|(id, _)| bus.flight(id).broken);
+        let all = sent.map(|(id, _)| bus.flight(id).mark.broken);
         assert_eq!(all, [true, true, true, true, true], "the last two by the long one");
+    }
+
+    #[test]
+    fn what_comes_from_nowhere_spoils_the_idle_time_before_a_request() {
+        let mut bus = line().with_t_syn(ns(100) - ns(0));
+        let noise = Mark { origin: Origin::Disturbance(0), broken: true, apart: true };
+        let mut answer = Frame::new();
+        answer.set_short_ack();
+        let mut put = |from, to, frame: &Frame, mark| {
+            let (id, hit) = bus.send(0, (ns(from), ns(to)), frame, mark);
+            bus.add_listeners(id, 1);
+            assert_eq!(hit, None);
+            id
+        };
+        let mut at = |begin, frame: &Frame| {
+            // The telegram may have been planned before the noise, or may come afterwards.
+            let planned = put(begin + 50, begin + 60, frame, Mark::OWN);
+            put(begin, begin + 10, &token(), noise);
+            (planned, put(begin + 109, begin + 119, frame, Mark::OWN), put(begin + 219, begin + 229, frame, Mark::OWN))
+        };
+        let (tokens, answers) = (at(0, &token()), at(1_000, &answer));
+        let broken = |(a, b, c): (FlightId, FlightId, FlightId)| [a, b, c].map(|id| bus.flight(id).mark.broken);
+        assert_eq!((broken(tokens), broken(answers)), ([true, true, false], [false; 3]));
     }
 
     #[test]
     fn what_a_station_without_supply_had_planned_never_comes() {
         let mut bus = line();
-        let (running, _) = bus.send(0, (ns(0), ns(100)), &token(), GOOD);
+        let (running, _) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
         bus.add_listeners(running, 1);
         bus.silence(0, ns(50));
         assert_eq!(bus.flight(running).frame.octets(), token().octets(), "under way, it is finished");
         bus.heard(running);
-        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token(), GOOD);
+        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token(), Mark::OWN);
         bus.add_listeners(planned, 1);
         bus.silence(1, ns(300));
         assert!(!bus.flight(planned).frame.is_empty(), "another station's supply");
         bus.silence(0, ns(300));
         assert!(bus.flight(planned).frame.is_empty());
         assert!(!bus.is_busy(ns(550), 0), "the line stays free");
-        let (_, hit) = bus.send(1, (ns(550), ns(650)), &token(), GOOD);
+        let (_, hit) = bus.send(1, (ns(550), ns(650)), &token(), Mark::OWN);
         assert_eq!(hit, None);
     }
 
     #[test]
     fn a_receiver_sees_the_line_busy_one_delay_later() {
         let mut bus = line();
-        let (id, _) = bus.send(0, (ns(100), ns(200)), &token(), GOOD);
+        let (id, _) = bus.send(0, (ns(100), ns(200)), &token(), Mark::OWN);
         assert_eq!([149, 150, 249, 250].map(|t| bus.is_busy(ns(t), 1)), [false, true, true, false]);
         assert_eq!((bus.arrival(id, 0), bus.arrival(id, 1)), ((ns(200), 0), (ns(250), 0)));
         // Forgotten when as many as are kept have followed.
         for _ in 0..RECENT {
-            bus.send(1, (ns(1_000), ns(1_100)), &token(), GOOD);
+            bus.send(1, (ns(1_000), ns(1_100)), &token(), Mark::OWN);
         }
         assert!(!bus.is_busy(ns(150), 1) && bus.is_busy(ns(1_050), 1) && bus.is_busy(ns(1_149), 0));
     }
@@ -344,7 +407,7 @@ mod tests {
         let mut strays = Vec::new();
         for sender in [0, 1, 2].into_iter().cycle().take(300) {
             let start = ns(strays.len() as i64 * 1_000);
-            let (id, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token(), GOOD);
+            let (id, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token(), Mark::OWN);
             let delay = |listener| bus.arrival(id, listener).0 - bus.flight(id).end;
             let stray = expected.draw();
             let behind = Span::from_ns(100) + stray;

@@ -9,6 +9,7 @@ pub mod instant;
 pub mod line;
 pub mod manner;
 pub mod order;
+pub mod source;
 pub mod station;
 pub mod turn;
 pub mod which;
@@ -18,6 +19,7 @@ use crate::sim::fault::clock::{CrystalFault, Pull};
 use crate::sim::fault::instant::{InstantFault, Straying};
 use crate::sim::fault::line::{Line, LineFault};
 use crate::sim::fault::order::OrderFault;
+use crate::sim::fault::source::{Source, SourceFault};
 use crate::sim::fault::station::{Apart, StationFault};
 use crate::sim::fault::turn::Turns;
 use crate::sim::fault::window::Window;
@@ -43,6 +45,8 @@ pub struct Disturbance {
 pub enum What {
     /// It decides what becomes of telegrams.
     Line(LineFault),
+    /// It puts something on the line.
+    Source(SourceFault),
     /// It takes stations off the line, or their supply away.
     Station(Vec<Address>, StationFault),
     /// It changes the rate of crystals.
@@ -64,6 +68,7 @@ impl What {
     pub fn stations(&self) -> &[Address] {
         match self {
             Self::Line(_) | Self::Clock(..) | Self::Repeater(..) | Self::Cut(_) => &[],
+            Self::Source(source) => source.near.as_slice(),
             Self::Station(stations, _)
             | Self::Crystal(stations, _)
             | Self::Instant(stations, _)
@@ -82,6 +87,8 @@ pub(super) struct Turning {
     pub what: What,
     /// What it makes of each station's crystal, in the order of the stations.
     pub pulls: Vec<Pull>,
+    /// What it puts on the line, if it does.
+    pub source: Option<Box<Source>>,
 }
 
 /// All disturbances of a network at work.
@@ -123,7 +130,7 @@ impl Faults {
                         InstantFault::Answer { .. } => faults.answers.push(straying),
                     }
                 }
-                What::Crystal(..) | What::Order(..) | What::Repeater(..) | What::Cut(_) => {}
+                What::Source(_) | What::Crystal(..) | What::Order(..) | What::Repeater(..) | What::Cut(_) => {}
             }
             if matches!(what, What::Line(_)) {
                 continue;
@@ -133,12 +140,17 @@ impl Faults {
                 _ => None,
             };
             let pulls = what.stations().iter().filter_map(pull).collect();
+            let source = match what {
+                What::Source(fault) => Some(Box::new(Source::new(name, fault.clone(), seed))),
+                _ => None,
+            };
             faults.turning.push(Turning {
                 number,
                 name: name.clone(),
                 turns: Turns::new(*window),
                 what: what.clone(),
                 pulls,
+                source,
             });
         }
         faults
@@ -147,6 +159,7 @@ impl Faults {
     pub(super) fn go_on_from(&mut self, before: &Self) {
         let all = &self.all;
         let same = |number: u16| before.all.iter().position(|other| *other == all[usize::from(number)]);
+        self.line.go_on_from(&before.line, same);
         for (number, source) in &mut self.clocks {
             let old = same(*number).and_then(|old| before.clocks.iter().find(|(other, _)| usize::from(*other) == old));
             if let Some((_, old)) = old {

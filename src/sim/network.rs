@@ -5,12 +5,14 @@
 //! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
 mod disturbed;
+mod source;
 mod tune;
 mod turn;
 
+use crate::fdl::params::BusParams;
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
 use crate::observation::Observation;
-use crate::sim::bus::{Bus, Flight, FlightId};
+use crate::sim::bus::{Bus, Flight, FlightId, Mark};
 use crate::sim::crystal::Crystal;
 use crate::sim::cut::Cuts;
 use crate::sim::fault::Faults;
@@ -18,10 +20,10 @@ use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{Resolution, Shaft};
 use crate::sim::noise::LinkJitter;
 use crate::sim::queue::{Key, NearQueue, Phase, Queue};
-use crate::sim::record::{Origin, Recorder, Stamp, Transmission};
+use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
-use crate::wire::Address;
+use crate::wire::{Address, Frame};
 use disturbed::Held;
 use turn::Turning;
 
@@ -118,6 +120,8 @@ enum Event {
     Turn(u16),
     /// A disturbance of this number among those that turn changes rates of crystals.
     Step(u16),
+    /// A disturbance of this number among those that turn puts something on the line.
+    Source(u16),
 }
 
 /// What a station's supply depends on.
@@ -171,6 +175,8 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     jitter: JitterSource,
     faults: Faults,
     held: Held,
+    /// Room for what comes onto the line from nowhere.
+    foreign: Frame,
     acts: Vec<(usize, Act<S::Command>)>,
     /// Which of them do not count any more.
     cancelled: core::ops::Range<usize>,
@@ -234,11 +240,12 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             by_address,
             curious: Vec::new(),
             neighbours: Vec::new(),
-            bus: wiring.bus(&places),
+            bus: wiring.bus(&places).with_t_syn(rate.span(BusParams::T_SYN)),
             queue: Q::default(),
             jitter,
             faults,
             held: Held::default(),
+            foreign: Frame::new(),
             acts: Vec::new(),
             cancelled: 0..0,
             cycle_acts: Vec::new(),
@@ -322,6 +329,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Event::Held(which) => self.release(slot, usize::from(which), recorder),
             Event::Turn(number) => self.turn(number.into(), recorder),
             Event::Step(number) => self.step_crystals(number.into()),
+            Event::Source(number) => self.emit(number.into(), recorder),
         }
         true
     }
@@ -385,7 +393,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         if station.powered && !self.bus.flight(id).frame.is_empty() && self.hears(slot, id) {
             self.out.clear();
             let flight = self.bus.flight(id);
-            let octets = if flight.broken { &[] } else { flight.frame.octets() };
+            let octets = if flight.mark.broken { &[] } else { flight.frame.octets() };
             let input = Input::Telegram(Heard { octets, sample });
             self.slots[slot].site.machine.step(now, input, &mut self.out);
             self.bus.heard(id);
@@ -540,14 +548,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             return;
         }
         let Some((_, frame)) = self.out.sending() else { return };
-        let flight = self.bus.send(slot, (start, end), frame, (Origin::Sender, false));
+        let flight = self.bus.send(slot, (start, end), frame, Mark::OWN);
         self.sent_off(slot, flight, recorder);
     }
     /// Tells that a telegram is on the line, and its listeners when its end will reach them.
     fn sent_off<R: Recorder>(&mut self, slot: usize, (id, hit): (FlightId, Option<usize>), recorder: &mut R) {
         let sender = self.slots[slot].address;
-        let Flight { start, end, origin, ref frame, .. } = *self.bus.flight(id);
-        recorder.telegram(&Transmission { start, end, sender, octets: frame.octets(), origin });
+        let Flight { start, end, mark, ref frame, .. } = *self.bus.flight(id);
+        recorder.telegram(&Transmission { start, end, sender, octets: frame.octets(), origin: mark.origin });
         if let Some(with) = hit {
             self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
         }
@@ -577,7 +585,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
     }
     fn deliver_to(&mut self, listener: usize, sender: usize, id: FlightId, route: Option<Route>) -> bool {
-        if listener == sender || !self.slots[listener].filter.passes(route) {
+        if listener == sender && !self.bus.flight(id).mark.apart || !self.slots[listener].filter.passes(route) {
             return false;
         }
         self.bus.add_listeners(id, 1);
@@ -588,8 +596,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// heard, so that the queue holds one event of the telegram, not one for each station. Where links have jitter, who
     /// is nearest differs from telegram to telegram, and all are told now; so where receivers have.
     fn broadcast(&mut self, sender: usize, id: FlightId) {
+        if self.bus.flight(id).mark.apart {
+            self.bus.add_listeners(id, 1);
+            self.push_telegram(sender, id, Event::Telegram(id));
+        }
         let count = self.neighbours[sender].len();
         match count {
+            0 if self.bus.flight(id).mark.apart => return,
             0 => return self.bus.unheard(id),
             count => self.bus.add_listeners(id, count as u16),
         }

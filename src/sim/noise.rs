@@ -60,6 +60,8 @@ purposes! {
     PowerOn = b"power-on";
     /// Where a shaft stands when the run begins.
     Shaft = b"shaftpos";
+    /// Electrical noise on the line.
+    Noise = b"linenois";
     /// Acyclic requests of the master.
     Acyclic = b"acyclic-";
     /// What a repeater's delay strays by, telegram by telegram.
@@ -178,6 +180,16 @@ impl Stream {
                 return span;
             }
         }
+    }
+
+    /// A span with an exponential distribution about `mean`, rounded up to a whole tick, at least one.
+    ///
+    /// # Panics
+    /// If `mean` is not positive.
+    pub fn exponential(&mut self, mean: Span) -> Span {
+        assert!(mean > Span::ZERO, "mean {mean} is not positive");
+        // The logarithm is above -37, the mean of a run's length at most.
+        Span::from_ticks(libm::ceil(-libm::log(self.unit()) * mean.ticks() as f64).max(1.0) as i64)
     }
 
     /// An odd multiple of 2^-53 between 0 and 1: exact, neither of the two.

@@ -14,6 +14,7 @@ use crate::dp::handler::{Patch, SlaveParams, StartupTelegram};
 use crate::dp::iso::Rearm;
 use crate::dp::master::{Master, Pace, Settings};
 use crate::dp::ms2::{self, client};
+use crate::fdl::active::HoldToken;
 use crate::observation::MasterMode;
 use crate::sim::crystal::Crystal;
 use crate::sim::fault::order::OrderFault;
@@ -217,14 +218,14 @@ pub fn order<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &
 /// Tells `network` what the disturbances of `scenario` order of masters.
 pub fn order_disturbances<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &Scenario) {
     for (number, disturbance) in scenario.disturbances.iter().enumerate() {
-        if let What::Order(slaves, fault) = &disturbance.what {
-            let [begin, end] = order_bursts(scenario, slaves, *fault);
+        if let What::Order(stations, fault) = &disturbance.what {
+            let [begin, end] = order_bursts(scenario, stations, *fault);
             network.order_bursts(number as u16, &begin, &end);
         }
     }
 }
 
-/// What a disturbance orders of the masters of these slaves at the beginning and at the end of a burst.
+/// What a disturbance orders of these masters, or of the masters of these slaves, at the beginning and at the end of a burst.
 fn order_bursts(scenario: &Scenario, slaves: &[Address], fault: OrderFault) -> [Vec<(Address, Command)>; 2] {
     let owner = |slave| scenario.slave(slave).map_or(scenario.master.address, |slave| slave.master);
     let all = |order: &dyn Fn(Address) -> Command| slaves.iter().map(|&slave| (owner(slave), order(slave))).collect();
@@ -236,6 +237,10 @@ fn order_bursts(scenario: &Scenario, slaves: &[Address], fault: OrderFault) -> [
         }
         OrderFault::JumpLife(to) => [life(&|slave| controller::Command::JumpLife(slave, to)), Vec::new()],
         OrderFault::RepeatLife => [life(&|slave| controller::Command::HoldLife(slave, Some(t_mapc))), Vec::new()],
+        OrderFault::HoldToken(by) => {
+            let hold = |by| slaves.iter().map(|&master| (master, Command::HoldToken(HoldToken(by)))).collect();
+            [hold(by), hold(Span::ZERO)]
+        }
         OrderFault::WrongPrm(patch) => {
             let prm = |patch| move |slave| Command::Patch(slave, StartupTelegram::Prm, patch);
             [all(&prm(patch)), all(&prm(Patch::default()))]

@@ -339,6 +339,11 @@ impl Frame {
             self.len = octets.len() as u8;
         }
     }
+    /// Becomes so many octets of zero, 255 at most.
+    pub fn set_len(&mut self, len: usize) {
+        self.len = len.min(MAX_FRAME) as u8;
+        self.octets_mut().fill(0);
+    }
     /// The octets.
     pub fn octets(&self) -> &[u8] {
         &self.octets[..self.len()]

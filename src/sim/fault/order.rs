@@ -1,8 +1,9 @@
-//! What goes wrong in a master's application: orders at the beginning and at the end of each burst.
+//! What goes wrong in masters and their applications: orders at the beginning and at the end of each burst.
 
 use crate::dp::handler::Patch;
+use crate::time::Span;
 
-/// What a disturbance orders of the masters of slaves.
+/// What a disturbance orders of masters, or of the masters of slaves.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum OrderFault {
     /// The sign of life for these slaves stops, and counts again at the end.
@@ -11,6 +12,8 @@ pub enum OrderFault {
     JumpLife(u8),
     /// One value of the sign of life for these slaves is sent for twice as long, at each beginning.
     RepeatLife,
+    /// These masters keep each token so much longer.
+    HoldToken(Span),
     /// These slaves are started anew with a changed Set_Prm, and with the good one at the end.
     WrongPrm(Patch),
 }
@@ -18,6 +21,11 @@ pub enum OrderFault {
 impl OrderFault {
     /// Whether the end of a disturbance takes back what another one of this kind may still want.
     pub fn holds_with(&self, other: &Self) -> bool {
-        matches!((self, other), (Self::HoldLife, Self::HoldLife) | (Self::WrongPrm(_), Self::WrongPrm(_)))
+        matches!(
+            (self, other),
+            (Self::HoldLife, Self::HoldLife)
+                | (Self::HoldToken(_), Self::HoldToken(_))
+                | (Self::WrongPrm(_), Self::WrongPrm(_))
+        )
     }
 }

@@ -5,6 +5,7 @@
 use super::{Event, Network, NetworkEvent};
 use crate::fdl::Station;
 use crate::observation::Observation;
+use crate::sim::bus::Mark;
 use crate::sim::fault::line::Struck;
 use crate::sim::fault::which::Sent;
 use crate::sim::queue::{Phase, Queue};
@@ -80,7 +81,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let place = self.held.keep(frame, broken, Origin::Sender, length);
             return self.push(start + late, Phase::Send, slot, Event::Held(place));
         }
-        let flight = self.bus.send(slot, (start, end), frame, (Origin::Sender, broken));
+        let flight = self.bus.send(slot, (start, end), frame, Mark { broken, ..Mark::OWN });
         self.sent_off(slot, flight, recorder);
     }
     /// Keeps the copies of a telegram of this length that ends at `end`, as its sender has sent it.
@@ -103,7 +104,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         if *origin == Origin::Sender && !sends {
             return;
         }
-        let flight = bus.send(slot, (*now, *now + *length), frame, (*origin, *broken));
+        let flight =
+            bus.send(slot, (*now, *now + *length), frame, Mark { origin: *origin, broken: *broken, apart: false });
         self.sent_off(slot, flight, recorder);
     }
 }

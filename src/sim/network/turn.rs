@@ -8,6 +8,7 @@ use super::{Event, Network, NetworkEvent, Phase, Queue};
 use crate::fdl::Station;
 use crate::observation::{Disturbance, Observation};
 use crate::sim::fault::order::OrderFault;
+use crate::sim::fault::source::Source;
 use crate::sim::fault::station::StationFault;
 use crate::sim::fault::turn::{Turn, Turns};
 use crate::sim::fault::{self, What};
@@ -19,12 +20,12 @@ use crate::wire::Address;
 #[derive(Clone)]
 pub(super) struct Turning<C> {
     /// Number of the disturbance in the scenario, from 0.
-    number: u16,
+    pub number: u16,
     name: String,
     what: What,
-    turns: Turns,
+    pub turns: Turns,
     /// It is no more among the disturbances: a burst that goes on ends, and no other begins.
-    retired: bool,
+    pub retired: bool,
     /// Whom it is told of: the stations that it means, or the first station.
     pub slots: Vec<usize>,
     pub effect: Effect<C>,
@@ -43,6 +44,8 @@ pub(super) enum Effect<C> {
     Cut,
     /// Crystals run at other rates.
     Crystals(Tuning),
+    /// Something comes onto the line.
+    Source(Box<Source>),
     /// Orders to masters.
     Orders { fault: OrderFault, begin: Vec<(usize, C)>, end: Vec<(usize, C)> },
 }
@@ -69,14 +72,15 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
         }
         for mut new in all {
-            if !self.turning.iter().any(|turning| known(turning, &new)) {
-                new.turns = Turns::from(new.turns.window(), self.now, self.clocks);
-                self.add_turning(new);
+            if self.turning.iter().any(|turning| known(turning, &new)) {
+                continue;
             }
+            new.turns = Turns::from(new.turns.window(), self.now, self.clocks);
+            self.add_turning(new);
         }
     }
     fn add_turning(&mut self, new: fault::Turning) {
-        let fault::Turning { number, name, turns, what, pulls } = new;
+        let fault::Turning { number, name, turns, what, pulls, source } = new;
         let mut slots: Vec<_> = what.stations().iter().filter_map(|&station| self.slot_of(station)).collect();
         if slots.is_empty() {
             slots.push(Self::CLOCK);
@@ -87,7 +91,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
             What::Repeater(..) => Effect::Link,
             What::Cut(_) => Effect::Cut,
-            What::Line(_) | What::Station(..) | What::Clock(..) | What::Instant(..) => Effect::None,
+            What::Line(_) | What::Source(_) | What::Station(..) | What::Clock(..) | What::Instant(..) => {
+                source.map_or(Effect::None, Effect::Source)
+            }
         };
         self.turning.push(Turning { number, name, what, turns, retired: false, slots, effect });
         self.plan_turn(self.turning.len() - 1);
@@ -118,7 +124,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// Sees to it that the disturbance turns next when it has to.
-    fn plan_turn(&mut self, index: usize) {
+    pub(super) fn plan_turn(&mut self, index: usize) {
         let Turning { turns, slots, retired, .. } = &self.turning[index];
         if *retired {
             return;
@@ -172,9 +178,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         match self.turning[index].effect {
             Effect::Crystals(_) => self.turn_crystals(index, on),
             Effect::Orders { fault, .. } => self.order_burst((index, fault), on, recorder),
+            Effect::Source(_) if on => self.start_source(index),
             Effect::Link => self.bus.disturb_link(&self.turning[index].name, on),
             Effect::Cut => self.bus.cut(&self.turning[index].name, on, self.now),
-            Effect::None | Effect::Supply => {}
+            Effect::Source(_) | Effect::None | Effect::Supply => {}
         }
         self.plan_turn(index);
     }

@@ -67,6 +67,7 @@ static STAGES: &[Stage] = &[
         disturbance::station::are_there,
         disturbance::application::are_slaves,
         disturbance::clock::are_crystals,
+        disturbance::token::are_masters,
         disturbance::path::in_order,
         disturbance::path::few_cuts,
         services::commands,
@@ -502,9 +503,13 @@ fn event_instants(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
-        let What::Line(LineFault { which: Which { from, to, .. }, .. }) = &disturbance.what else { continue };
-        for (key, station) in [("from", from), ("to", to)] {
-            if let Some(address) = *station
+        let named = match &disturbance.what {
+            What::Line(LineFault { which: Which { from, to, .. }, .. }) => [("from", *from), ("to", *to)],
+            What::Source(source) => [("near", source.near), ("near", None)],
+            _ => continue,
+        };
+        for (key, station) in named {
+            if let Some(address) = station
                 && address != facts.scenario.master.address
                 && facts.scenario.class1(address).is_none()
                 && facts.scenario.slave(address).is_none()

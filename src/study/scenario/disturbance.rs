@@ -7,7 +7,9 @@ mod gc_jitter;
 mod line;
 mod manner;
 pub(super) mod path;
+mod source;
 pub(super) mod station;
+pub(super) mod token;
 pub mod which;
 
 use super::error::Fault;
@@ -53,6 +55,9 @@ pub const DISTURBANCES: &[DisturbanceKind] = &[
     line::DUPLICATE_TELEGRAMS,
     line::BIT_ERRORS,
     line::WRONG_OCTET,
+    source::NOISE,
+    source::FOREIGN_TELEGRAM,
+    token::LATE_TOKEN,
     station::SILENT,
     station::MUTE,
     station::DEAF,

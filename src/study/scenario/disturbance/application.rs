@@ -71,7 +71,10 @@ fn order(fault: OrderFault, section: &mut Section<'_>, reader: &mut Reader<'_>) 
 /// Orders are about slaves that a master has in its list.
 pub(in crate::study::scenario) fn are_slaves(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
-        let What::Order(stations, _) = &disturbance.what else { continue };
+        let What::Order(stations, fault) = &disturbance.what else { continue };
+        if matches!(fault, OrderFault::HoldToken(_)) {
+            continue;
+        }
         let no_slave = |address: &&_| facts.scenario.slave(**address).is_none_or(|slave| slave.silent);
         if let Some(address) = stations.iter().find(no_slave) {
             let fault = Fault::new(format!("station {address} is not a slave of a master"))
