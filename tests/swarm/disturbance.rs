@@ -172,13 +172,15 @@ pub(super) const KINDS: &[(&str, Generator)] = &[
 pub(super) fn disturbance(draw: &mut Draw, text: &mut String, scene: &Scene<'_>) -> bool {
     let (kind, generator) = draw.one(KINDS);
     let Some(drawn) = generator(draw, scene) else { return false };
-    let window = window(draw, scene);
+    // Without its supply the master begins no cycles, and nothing is counted in them.
+    let in_cycles = kind != "restart" && draw.percent(50);
+    let window = window(draw, scene, in_cycles);
     let _ = write!(text, "[[disturbance]]\nkind = \"{kind}\"\n{}{window}", drawn.keys);
     drawn.token_at_risk
 }
 
 /// When it acts: in cycles or at instants, once or several times, over by the end of the scene.
-fn window(draw: &mut Draw, scene: &Scene<'_>) -> String {
+fn window(draw: &mut Draw, scene: &Scene<'_>, in_cycles: bool) -> String {
     let (from, to) = scene.cycles;
     let first = draw.within(from..=to - 20);
     let room = to - first - 5;
@@ -188,7 +190,7 @@ fn window(draw: &mut Draw, scene: &Scene<'_>) -> String {
     let times = (room / every).max(1);
     let repeated = draw.percent(30) && times > 1;
     let times = draw.within(1..=times);
-    if draw.percent(50) {
+    if in_cycles {
         let again = if repeated { format!("every = {every}\ntimes = {times}\n") } else { String::new() };
         return format!("cycle = {first}\nfor = {length}\n{again}");
     }
