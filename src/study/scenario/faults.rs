@@ -1088,6 +1088,17 @@ good.toml:45:9: disturbance.1.every: 1 ms is too short
 "#,
         ),
         (
+            "kind = \"missing-clocks\"",
+            "kind = \"restart\"\nstation = 2",
+            r#"
+good.toml:45:7: disturbance.1.for: the supply of [master], station 2, would never return
+  45 | for = 1
+     |       ^
+  rule: cycles are those of [master], and without supply it begins none
+  help: at and for as times, such as at = "1 s", for = "20 ms"
+"#,
+        ),
+        (
             "every = 100",
             "every = 100\nname = \"x\"\n[[disturbance]]\nkind = \"missing-clocks\"\nname = \"x\"",
             r#"

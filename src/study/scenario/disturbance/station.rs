@@ -3,6 +3,7 @@
 use super::{DisturbanceKind, Key};
 use crate::sim::fault::What;
 use crate::sim::fault::station::StationFault;
+use crate::sim::fault::window::{Bursts, Window};
 use crate::study::plan::rules::Facts;
 use crate::study::scenario::check::about;
 use crate::study::scenario::error::Fault;
@@ -77,6 +78,20 @@ fn many(node: &Node, slaves: &[Address]) -> Result<Vec<Address>, Fault> {
     match &node.value {
         Value::Text(text) if matches!(text.trim(), "all slaves" | "all") => Ok(slaves.to_vec()),
         _ => address_list(node),
+    }
+}
+
+/// A master without supply begins no cycles, so that its return cannot be counted in them.
+pub(in crate::study::scenario) fn come_back(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let master = facts.scenario.master.address;
+    for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
+        let off = matches!(&disturbance.what, What::Station(all, StationFault::Restart) if all.contains(&master));
+        if off && matches!(disturbance.window, Window::Cycles(Bursts { length: Some(_), .. })) {
+            let fault = Fault::new(format!("the supply of [master], station {master}, would never return"))
+                .rule("cycles are those of [master], and without supply it begins none")
+                .help("at and for as times, such as at = \"1 s\", for = \"20 ms\"");
+            about(reader, &format!("disturbance.{}.for", i + 1), &[], fault);
+        }
     }
 }
 
