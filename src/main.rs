@@ -3,6 +3,8 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::{Args, Parser, Subcommand};
@@ -14,10 +16,14 @@ use isodp::study::budget::Budget;
 use isodp::study::compare::command as compare;
 use isodp::study::export::capture;
 use isodp::study::gsd::Gsd;
-use isodp::study::plan::command::{Call, answer};
+use isodp::study::plan::command::{Call as PlanCall, answer};
 use isodp::study::replay::{self, Window};
 use isodp::study::run::{Progress, layout};
 use isodp::study::scenario::{Extent, Scenario, disturbance};
+use isodp::study::sweep::command::{Call, End, Progress as SweepProgress, join, sweep};
+use isodp::study::sweep::crew::cores;
+use isodp::study::sweep::is_at_work;
+use isodp::study::sweep::shard::Shard;
 use isodp::study::what_if::command as what_if;
 use isodp::study::{batch, devices, figure};
 use isodp::time::Span;
@@ -27,6 +33,8 @@ use isodp::time::Span;
 const VIOLATED: u8 = 1;
 /// A wrong call, scenario or file.
 const USAGE: u8 = 2;
+/// Ended by Ctrl-C, as shells tell it: 128 and the number of the signal.
+const STOPPED: u8 = 130;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -72,6 +80,9 @@ Examples:
 
 Exit codes of compare: 0 nothing moved beyond its tolerance, 1 a figure did, 2 wrong usage, file, or baseline.";
 
+const SWEEP_CODES: &str = "\
+Exit codes: 0 all runs are done, 1 some failed or are missing, 2 wrong usage or file, 130 stopped by Ctrl-C; the same call goes on.";
+
 /// Simulates isochronous PROFIBUS DP (DP-V2) networks, telegram by telegram, in deterministic time.
 #[derive(Parser)]
 #[command(version, about, after_help = EXAMPLES)]
@@ -100,6 +111,12 @@ enum Command {
     /// Runs a scenario and tells which figures moved since its baseline was written, and where the two runs parted.
     #[command(after_help = REGRESSION)]
     Compare(CompareArgs),
+    /// Runs a scenario many times, with other parameters and other draws, on all cores; what is done is not done again.
+    #[command(after_help = SWEEP_CODES)]
+    Sweep(SweepArgs),
+    /// Joins the parts of a sweep that several machines ran with isodp sweep --shard.
+    #[command(after_help = SWEEP_CODES)]
+    Merge(MergeArgs),
     /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
     /// Lists the disturbances that a scenario can name, with their keys and an example of each, or tells about one.
@@ -137,6 +154,35 @@ struct GsdArgs {
     /// GSD file of a PROFIBUS DP slave, in any language (.gsd, .gse, .gsg ...).
     #[arg(value_name = "FILE")]
     file: PathBuf,
+}
+
+#[derive(Args)]
+struct SweepArgs {
+    /// Sweep file (TOML), which names its scenario.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Directory for the results; they go to DIR/<sweep>/.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Runs at the same time; without it one per core.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Does part I of N of the runs, into a directory of its own; isodp merge joins the parts.
+    #[arg(long, value_name = "I/N", default_value_t = Shard::ALL)]
+    shard: Shard,
+    /// Lists all runs with their parameters, seeds and keys, and what is done of them, and runs nothing.
+    #[arg(long)]
+    plan: bool,
+}
+
+#[derive(Args)]
+struct MergeArgs {
+    /// Directory of the whole sweep.
+    #[arg(value_name = "OUT")]
+    out: PathBuf,
+    /// Directories of its parts.
+    #[arg(value_name = "PART", required = true)]
+    parts: Vec<PathBuf>,
 }
 
 #[derive(Args)]
@@ -286,6 +332,8 @@ fn main() -> ExitCode {
         Command::Replay(args) => replay_command(args).map(done),
         Command::Baseline(args) => baseline_command(args).map(done),
         Command::Compare(args) => compare_command(args),
+        Command::Sweep(args) => sweep_command(args),
+        Command::Merge(args) => merge_command(&args),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
         Command::Disturbances(args) => disturbances_command(args.name.as_deref()).map(done),
         Command::Figures(args) => figures_command(args.scenario.as_deref()).map(done),
@@ -340,7 +388,7 @@ fn run_command(args: RunArgs) -> Result<(String, ExitCode), Box<dyn std::error::
 
 fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
     let PlanArgs { scenario: file, out, sets, propose, rules, slave } = args;
-    let answer = answer(&Call { file, sets, propose, rules, slave, out })?;
+    let answer = answer(&PlanCall { file, sets, propose, rules, slave, out })?;
     let code = if answer.violated { ExitCode::from(VIOLATED) } else { ExitCode::SUCCESS };
     Ok((answer.page, code))
 }
@@ -408,6 +456,38 @@ fn compare_command(args: CompareArgs) -> Result<(String, ExitCode), Box<dyn std:
     Ok((answer.page, code))
 }
 
+fn sweep_command(args: SweepArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
+    let SweepArgs { file, out, threads, shard, plan } = args;
+    let stop = Arc::new(AtomicBool::new(false));
+    let told = Arc::clone(&stop);
+    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))?;
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        // The page names every run that breaks off.
+        if !is_at_work() {
+            usual(panic);
+        }
+    }));
+    let bar = SweepBar::new();
+    let threads = threads.map_or_else(cores, usize::from);
+    let answer = sweep(&Call { file, out, threads, shard, plan }, &stop, |at| bar.show(at))?;
+    bar.0.finish_and_clear();
+    Ok((answer.page, code(answer.end)))
+}
+
+fn merge_command(args: &MergeArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
+    let answer = join(&args.out, &args.parts)?;
+    Ok((answer.page, code(answer.end)))
+}
+
+fn code(end: End) -> ExitCode {
+    match end {
+        End::Done => ExitCode::SUCCESS,
+        End::Failed => ExitCode::from(VIOLATED),
+        End::Stopped => ExitCode::from(STOPPED),
+    }
+}
+
 /// Overrides with that of the seed, where one is given.
 fn with_seed(mut sets: Vec<(String, String)>, seed: Option<u64>) -> Vec<(String, String)> {
     sets.extend(seed.map(|seed| ("run.seed".to_owned(), seed.to_string())));
@@ -459,5 +539,26 @@ impl Bar {
             at.simulated.as_s(),
             at.cycles
         ));
+    }
+}
+
+/// The progress bar of a sweep.
+struct SweepBar(ProgressBar);
+
+impl SweepBar {
+    fn new() -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        let style = ProgressStyle::with_template("[{bar:30}] {pos} of {len} runs{msg}  {per_sec}  {eta} left");
+        bar.set_style(style.expect("a template that is right").progress_chars("=> "));
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self(bar)
+    }
+
+    fn show(&self, at: SweepProgress) {
+        self.0.set_length(at.runs as u64);
+        self.0.set_position(at.done as u64);
+        if at.failed > 0 {
+            self.0.set_message(format!(", {} failed", at.failed));
+        }
     }
 }

@@ -133,6 +133,10 @@ fn disturbances_of_stations_allocate_nothing() {
            [[disturbance]]\nkind = \"deaf\"\nstation = 4\ncycle = 510\nfor = 1\nevery = 50\n\
            [[disturbance]]\nkind = \"crystal-wander\"\nstations = \"all slaves\"\nstep = \"10 ppb\"\ninterval = \"1 ms\"\nbound = \"2 ppm\"\n\
            [[disturbance]]\nkind = \"temperature-step\"\nstation = 2\noffset = \"9 ppm\"\ntime_constant = \"1 s\"\ncycle = 500\nfor = 200\nevery = 400\n\
+           [[disturbance]]\nkind = \"gc-jitter\"\nshape = \"table\"\noffsets = [\"10 ns\", \"-10 ns\"]\n\
+           [[disturbance]]\nkind = \"receiver-jitter\"\nstation = 6\nhalf_width = \"20 ns\"\ncycle = 500\nfor = 9\nevery = 50\n\
+           [[disturbance]]\nkind = \"t-sdr-jitter\"\nstation = 7\nup_to = \"9 tbit\"\n\
+           [[disturbance]]\nkind = \"cable-cut\"\nposition = \"95 m\"\ncycle = 530\nfor = 1\nevery = 50\n\
            [[disturbance]]\nkind = \"hold-life-sign\"\nstation = 5\ncycle = 520\nfor = 1\nevery = 50\n";
     let disturbed = Scenario::parse("disturbed", "disturbed", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);

@@ -57,7 +57,8 @@ fn disturbed(disturbances: &[&str]) -> Run {
 }
 /// Each disturbance as a table.
 fn tables(disturbances: &[&str]) -> String {
-    disturbances.iter().map(|keys| format!("\n[[disturbance]]\n{}\n", keys.replace("; ", "\n"))).collect()
+    let lines = disturbances.iter().flat_map(|keys| ["[[disturbance]]"].into_iter().chain(keys.split("; ")));
+    lines.flat_map(|line| ["\n", line]).chain(["\n"]).collect()
 }
 /// What a scene with these disturbances comes to, station by station.
 fn prints(disturbances: &[&str]) -> Vec<(u8, Fingerprint)> {

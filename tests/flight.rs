@@ -251,7 +251,24 @@ fn another_reader_finds_every_telegram_in_the_pcapng_file() {
 }
 
 /// Each variable of a VCD file by its path, with its changes: unit of time and text of the value.
-fn read_vcd(octets: &[u8]) -> (Option<(u32, vcd::TimescaleUnit)>, BTreeMap<String, Vec<(u64, String)>>) {
+struct Waves(BTreeMap<String, Vec<(u64, String)>>);
+
+impl Waves {
+    /// The value of a variable at an instant, or nothing before its first.
+    fn value(&self, name: &str, at: u64) -> &str {
+        let changes = &self.0[name];
+        let after = changes.partition_point(|(then, _)| *then <= at);
+        after.checked_sub(1).map_or("", |before| changes[before].1.as_str())
+    }
+    /// Where a variable goes from 0 to 1.
+    fn rises(&self, name: &str) -> Vec<u64> {
+        let pairs = self.0[name].windows(2).filter(|pair| (pair[0].1.as_str(), pair[1].1.as_str()) == ("0", "1"));
+        pairs.map(|pair| pair[1].0).collect()
+    }
+}
+
+/// Reads a VCD file whose unit of time is 1 ps.
+fn read_vcd(octets: &[u8]) -> Waves {
     fn walk(items: &[vcd::ScopeItem], path: &str, found: &mut BTreeMap<vcd::IdCode, String>) {
         for item in items {
             match item {
@@ -285,7 +302,8 @@ fn read_vcd(octets: &[u8]) -> (Option<(u32, vcd::TimescaleUnit)>, BTreeMap<Strin
         };
         changes.get_mut(&names[&id]).expect("a variable").push((now, text));
     }
-    (header.timescale, changes)
+    assert_eq!(header.timescale, Some((1, vcd::TimescaleUnit::PS)));
+    Waves(changes)
 }
 /// An instant in picoseconds, to the nearest.
 fn ps(at: Time) -> u64 {
@@ -293,19 +311,10 @@ fn ps(at: Time) -> u64 {
 }
 
 #[test]
-fn another_reader_finds_states_and_edges_in_the_vcd_file() {
+fn another_reader_finds_the_bus_and_the_triggers_in_the_vcd_file() {
     let (_, recording) = recording("gc-jitter-outside", &[], &Flight::default());
-    let (scale, changes) = read_vcd(&file(&recording, "flight.vcd"));
-    assert_eq!(scale, Some((1, vcd::TimescaleUnit::PS)));
-    let value = |name: &str, at: u64| -> &str {
-        let changes = &changes[name];
-        let after = changes.partition_point(|(then, _)| *then <= at);
-        after.checked_sub(1).map_or("", |before| changes[before].1.as_str())
-    };
-    let rises = |name: &str| -> Vec<u64> {
-        let pairs = changes[name].windows(2).filter(|pair| (pair[0].1.as_str(), pair[1].1.as_str()) == ("0", "1"));
-        pairs.map(|pair| pair[1].0).collect()
-    };
+    let waves = read_vcd(&file(&recording, "flight.vcd"));
+    let value = |name: &str, at: u64| waves.value(name, at);
     for stretch in &recording.stretches {
         let end = ps(stretch.end);
         assert_eq!((value("isodp.recorded", ps(stretch.begin())), value("isodp.recorded", end)), ("1", "0"));
@@ -331,6 +340,13 @@ fn another_reader_finds_states_and_edges_in_the_vcd_file() {
             assert_eq!((value("isodp.bus.busy", ps(last)), value("isodp.bus.sender", ps(last))), ("0", "zzzzzzz"));
         }
     }
+}
+
+#[test]
+fn another_reader_finds_what_slaves_did_in_the_vcd_file() {
+    let (_, recording) = recording("gc-jitter-outside", &[], &Flight::default());
+    let waves = read_vcd(&file(&recording, "flight.vcd"));
+    let value = |name: &str, at: u64| waves.value(name, at);
     // Every change of state, where it is not followed by another one at once.
     let mut states = BTreeMap::new();
     for entry in recording.stretches.iter().flat_map(|stretch| &stretch.entries) {
@@ -359,9 +375,9 @@ fn another_reader_finds_states_and_edges_in_the_vcd_file() {
             |is_it| recording.stretches.iter().flat_map(|stretch| seen(stretch, slave, is_it)).collect::<Vec<_>>();
         let latches = all(|what| matches!(what, Observation::Latch { .. }));
         assert!(latches.len() > 10);
-        assert_eq!(rises(&format!("isodp.slave_{slave}.latch")), latches);
+        assert_eq!(waves.rises(&format!("isodp.slave_{slave}.latch")), latches);
         let set_points = all(|what| matches!(what, Observation::SetPoint { .. }));
-        assert_eq!(rises(&format!("isodp.slave_{slave}.t_o")), set_points);
+        assert_eq!(waves.rises(&format!("isodp.slave_{slave}.t_o")), set_points);
     }
     let errors = recording.stretches.iter().flat_map(|stretch| &stretch.entries).filter_map(|entry| match entry.what {
         What::Seen(Observation::Clock { error, window, .. }) => Some((entry.at, entry.station, error, window)),

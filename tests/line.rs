@@ -1,11 +1,12 @@
 //! Disturbances of the line in whole networks: each at full strength, and at none.
 
-use isodp::observation::{Disturbance, Observation};
+use isodp::observation::{ClockVerdict, Disturbance, Observation};
+use isodp::study::row::EventRow;
 use isodp::study::scenario::Scenario;
 use isodp::time::{Span, Time};
 use isodp::wire::Address;
 
-use crate::support::{Run, address};
+use crate::support::{Run, address, scenario};
 
 /// An isochronous master with two encoders.
 const NETWORK: &str = r#"
@@ -289,4 +290,91 @@ fn a_foreign_token_takes_the_token_away() {
     assert_eq!((count(&run, gone), foreign(&run, 2, &[0xDC, 6, 9]).len()), (1, 1));
     let claimed = count(&run, |seen| matches!(seen, Observation::TokenClaimed));
     assert_eq!(claimed, 2, "after T_TO of silence the master claims it again");
+}
+
+// ----- shipped scenarios
+
+/// The scenarios of this module with their tests.
+pub(crate) const TESTS: &[(&str, fn())] =
+    &[("bit-errors", bit_errors), ("burst-noise", burst_noise), ("late-token", late_token)];
+
+fn missing_clocks(run: &Run, slave: u8) -> Vec<u64> {
+    let missing = |seen: &Observation| matches!(seen, Observation::Clock { verdict: ClockVerdict::Missing, .. });
+    run.events_of(slave).filter(|row| missing(&row.what)).map(|row| row.cycle).collect()
+}
+/// No slave reports a fault or leaves data exchange.
+fn assert_unharmed(run: &Run) {
+    assert_eq!(count(run, |seen| matches!(seen, Observation::Fault { .. } | Observation::Lost { .. })), 0);
+}
+
+#[test]
+fn bit_errors() {
+    let run = Run::of(&scenario("bit-errors", &[]));
+    let wrong = count(&run, |seen| matches!(seen, Observation::Disturbed { how: Disturbance::WrongBits, .. }));
+    assert!((90..160).contains(&wrong), "{wrong}");
+    let (repeated, unanswered) = (retries(&run), count(&run, |seen| matches!(seen, Observation::NoAnswer { .. })));
+    let clocks = missing_clocks(&run, 3).len();
+    assert!((1..=16).contains(&clocks), "{clocks}");
+    assert!(repeated + clocks <= wrong && repeated + clocks + 30 > wrong, "{repeated} {clocks} of {wrong}");
+    assert!(unanswered < 10, "{unanswered}");
+    assert_unharmed(&run);
+    // Every set point and every position came as it was sent: the shafts stand at 0.
+    let positions = |what: &Observation| match what {
+        Observation::Latch { inputs, .. } => Some(inputs.xist1),
+        _ => None,
+    };
+    assert!(run.observations.iter().filter_map(|(_, _, seen)| positions(seen)).all(|position| position == 0));
+    assert_eq!(count(&run, |seen| matches!(seen, Observation::IllegalAnswer { .. })), 0);
+}
+
+#[test]
+fn burst_noise() {
+    let run = Run::of(&scenario("burst-noise", &[]));
+    let noise = disturbed(&run, 5, Disturbance::Noise);
+    assert!((340..460).contains(&noise), "{noise}");
+    let hits = collisions(&run);
+    assert!((noise / 12..noise / 4).contains(&hits), "{hits} of {noise}");
+    assert!(retries(&run) > 15);
+    for slave in 3..=8 {
+        let missing = missing_clocks(&run, slave);
+        assert_eq!(missing.len(), 3, "{missing:?}");
+        assert!(missing.iter().all(|cycle| cycle % 300 <= 6), "{missing:?}");
+    }
+    assert_unharmed(&run);
+    // After each burst it is quiet again.
+    let quiet = run.cycles.iter().filter(|row| row.cycle > 60 && row.cycle % 300 > 6);
+    assert!(quiet.into_iter().all(|row| row.retries == 0));
+    let last = |slave| run.row(slave, 1_400);
+    assert!((3..=8).all(|slave| last(slave).clock_counter == 0));
+}
+
+#[test]
+fn late_token() {
+    let scenario_ = scenario("late-token", &[]);
+    let run = Run::of(&scenario_);
+    let late = |seen: &Observation| match seen {
+        Observation::ClockLate { by } => Some(*by),
+        _ => None,
+    };
+    let late: Vec<_> = run.events_of(2).filter_map(|row| Some((row.cycle, late(&row.what)?))).collect();
+    assert_eq!(late.iter().map(|(cycle, _)| *cycle).collect::<Vec<_>>(), [301, 500]);
+    let near = |by: Span, us| (by - Span::from_us(us)).abs() < Span::from_us(1);
+    assert!(near(late[0].1, 92) && near(late[1].1, 133), "{late:?}");
+    let claimed = |seen: &Observation| matches!(seen, Observation::TokenClaimed);
+    assert_eq!(count(&run, claimed), 2, "at the start, and once for the token that was kept too long");
+    let dropped = |row: &&EventRow| matches!(row.what, Observation::TokenDropped { .. } | Observation::RingLeft { .. });
+    assert_eq!(run.events_of(12).filter(dropped).count(), 2);
+    let entered: Vec<_> =
+        run.events_of(12).filter(|row| matches!(row.what, Observation::RingEntered)).map(|row| row.cycle).collect();
+    assert!(entered.len() == 2 && entered[1] < 520, "{entered:?}");
+    for slave in 4..=6 {
+        assert_eq!(missing_clocks(&run, slave).len(), 2);
+        let stray = |row: &&EventRow| matches!(row.what, Observation::Clock { verdict: ClockVerdict::Stray, .. });
+        assert_eq!(run.events_of(slave).filter(stray).count(), 2);
+    }
+    assert_unharmed(&run);
+    assert_eq!(
+        scenario_.disturbances.iter().map(|one| one.name.as_str()).collect::<Vec<_>>(),
+        ["slow master", "slower master"]
+    );
 }

@@ -35,6 +35,7 @@ mod startup;
 mod statistics;
 mod support;
 mod swarm;
+mod sweep;
 mod topology;
 mod verdicts;
 mod what_if;

@@ -3,6 +3,7 @@
 //!
 //! `ISODP_SWARM_CASES` says how many networks, `ISODP_SWARM_SEED` the seed of the first one; the next has the next seed.
 
+mod disturbance;
 mod draw;
 mod scenario;
 
@@ -21,6 +22,7 @@ use isodp::sim::record::{Recorder, Stamp, Transmission};
 use isodp::study::count::Counts;
 use isodp::study::metric::Metrics;
 use isodp::study::row::{CycleRow, Sink};
+use isodp::study::scenario::disturbance::DISTURBANCES;
 use isodp::study::scenario::{Extent, Scenario};
 use isodp::study::{build, run};
 use isodp::time::{Local, Span, Time};
@@ -46,13 +48,17 @@ fn setting(name: &str, usual: u64) -> u64 {
 struct Watch {
     /// The first master.
     master: Option<Address>,
+    /// Its T_DP.
+    t_dp: Span,
     /// When a telegram was lost last.
     disturbed: Time,
     collisions: Vec<(Time, Address, Address)>,
     pll: BTreeMap<Address, PllState>,
     /// When the first master went back to Clear last.
     cleared: Time,
-    /// When the first master's SYNCH was late, and by how much.
+    /// When the first master repeated a request last.
+    repeated: Time,
+    /// When the first master's SYNCH was late, and by how much, though nothing had to be repeated.
     late: Option<(Time, Span)>,
     /// Cycles that the first master began.
     begun: u64,
@@ -66,6 +72,9 @@ impl Recorder for Watch {
         match *what {
             Observation::Disturbed { .. } => self.disturbed = stamp.at,
             Observation::Collision { with } => self.collisions.push((stamp.at, stamp.station, with)),
+            Observation::Retry { .. } if Some(stamp.station) == self.master => self.repeated = stamp.at,
+            // T_DP need not have room for what is repeated.
+            Observation::ClockLate { .. } if self.repeated + self.t_dp > stamp.at => {}
             Observation::ClockLate { by } => self.late = self.late.or(Some((stamp.at, by))),
             Observation::AutoClear { .. } => self.cleared = stamp.at,
             Observation::CycleStart { .. } if Some(stamp.station) == self.master => self.begun += 1,
@@ -121,7 +130,7 @@ fn run_on<Q: Queue<NetworkEvent>>(scenario: &Scenario, case: &Case, until: Optio
     let rows = Metrics::new(run::layout(scenario), |_, _| 0.0, Rows::default());
     let mut recorder = (
         Fingerprints::new(scenario.master.address),
-        (rows, Watch { master: Some(scenario.master.address), ..Watch::default() }),
+        (rows, Watch { master: Some(scenario.master.address), t_dp: scenario.master.t_dp, ..Watch::default() }),
     );
     // Every telegram has three characters and its idle time, and no station does more than a few things about it.
     let telegrams = case.cycle.div_floor(scenario.bus.params.rate.bit()) / 66;
@@ -141,7 +150,7 @@ fn run_on<Q: Queue<NetworkEvent>>(scenario: &Scenario, case: &Case, until: Optio
         let back = network.cycles() > case.last_cycle && now > quiet + patience;
         if until.map_or(back || late, |until| now >= until) {
             // A master that is kept out of the ring by what it loses begins no cycles: its disturbance never ends.
-            endless = now < quiet + patience;
+            endless = now < quiet + patience || network.cycles() <= case.last_cycle;
             break now;
         }
     };
@@ -269,6 +278,13 @@ fn try_seed(seed: u64) -> Tried {
         (true, true) => Tried::Endless,
         (false, true) => Tried::Well,
     }
+}
+
+#[test]
+fn every_kind_of_disturbance_is_drawn() {
+    let drawn: Vec<_> = disturbance::KINDS.iter().map(|&(kind, _)| kind).collect();
+    let known: Vec<_> = DISTURBANCES.iter().map(|kind| kind.name).collect();
+    assert_eq!(drawn, known);
 }
 
 #[test]

@@ -67,7 +67,8 @@ impl What {
     /// The stations that it means, where it names them.
     pub fn stations(&self) -> &[Address] {
         match self {
-            Self::Line(_) | Self::Clock(..) | Self::Source(_) | Self::Repeater(..) | Self::Cut(_) => &[],
+            Self::Line(_) | Self::Clock(..) | Self::Repeater(..) | Self::Cut(_) => &[],
+            Self::Source(source) => source.near.as_slice(),
             Self::Station(stations, _)
             | Self::Crystal(stations, _)
             | Self::Instant(stations, _)
@@ -158,6 +159,7 @@ impl Faults {
     pub(super) fn go_on_from(&mut self, before: &Self) {
         let all = &self.all;
         let same = |number: u16| before.all.iter().position(|other| *other == all[usize::from(number)]);
+        self.line.go_on_from(&before.line, same);
         for (number, source) in &mut self.clocks {
             let old = same(*number).and_then(|old| before.clocks.iter().find(|(other, _)| usize::from(*other) == old));
             if let Some((_, old)) = old {

@@ -87,13 +87,32 @@ impl EventBudget {
         recorder: &mut R,
         mut watch: impl FnMut(Progress),
     ) -> Result<(), NoHeadway> {
+        let always = |progress| {
+            watch(progress);
+            true
+        };
+        self.run_while(network, scenario, recorder, always).map(|_| ())
+    }
+    /// As [`run`](Self::run), as long as `go_on` says yes to the progress. Tells whether the end was reached.
+    ///
+    /// # Errors
+    /// The run makes no headway.
+    pub fn run_while<S: Station, Q: Queue<NetworkEvent>, R: Recorder>(
+        &self,
+        network: &mut Network<S, Q>,
+        scenario: &Scenario,
+        recorder: &mut R,
+        mut go_on: impl FnMut(Progress) -> bool,
+    ) -> Result<bool, NoHeadway> {
         let end = until(scenario);
         let in_cycles = matches!(scenario.run.duration, Extent::Cycles(_));
         let (mut from, mut events) = (network.now(), 0);
         let mut last_cycle = (network.cycles(), network.now());
         while !network.run(end, STRIDE, recorder) {
             let now = network.now();
-            watch(Progress { simulated: now.since_zero(), cycles: network.cycles() });
+            if !go_on(Progress { simulated: now.since_zero(), cycles: network.cycles() }) {
+                return Ok(false);
+            }
             events += STRIDE;
             let cycles = (now - from).div_floor(self.cycle);
             if events > self.per_cycle.saturating_mul(cycles as u64 + 2) {
@@ -113,8 +132,8 @@ impl EventBudget {
                 return Err(Self::stop(network, scenario, recorder, why));
             }
         }
-        watch(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
-        Ok(())
+        go_on(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
+        Ok(true)
     }
 
     /// What is told of a run that makes no headway: it goes on for a moment to see what it does.

@@ -77,6 +77,14 @@ impl Histogram {
         }
     }
 
+    /// Forgets every value. Allocates nothing.
+    pub fn reset(&mut self) {
+        for side in self.negative.iter_mut().chain([&mut self.positive]).filter(|side| !side.is_empty()) {
+            side.reset();
+        }
+        (self.below, self.above, self.min, self.max, self.sum) = (0, 0, i64::MAX, i64::MIN, 0);
+    }
+
     /// Adds everything that `other` counted.
     ///
     /// # Panics
@@ -395,6 +403,20 @@ impl Histograms {
         new
     }
 
+    /// Empty histograms for a network of `layout`, in the memory of these: for many short runs, of which each would
+    /// otherwise spend milliseconds on its own.
+    pub fn reset(&mut self, layout: &Layout) {
+        // With a ring there is a quantity more than without.
+        if self.layout.masters().is_empty() != layout.masters().is_empty() {
+            *self = Self::new(layout);
+            return;
+        }
+        self.layout.clone_from(layout);
+        reset(&mut self.network, layout);
+        reset(&mut self.slave, layout);
+        reset(&mut self.link, layout);
+    }
+
     /// The network these are of.
     pub fn layout(&self) -> &Layout {
         &self.layout
@@ -430,6 +452,16 @@ impl Histograms {
 
 fn named<'a, R>(all: &'a [Recorded<R>], name: &str) -> Option<&'a [Histogram]> {
     all.iter().find(|recorded| recorded.name == name).map(|recorded| &recorded.subjects[..])
+}
+
+/// Empties everything, with as many subjects as `layout` has.
+fn reset<R>(all: &mut [Recorded<R>], layout: &Layout) {
+    for recorded in all {
+        let quantity = Quantity::named(recorded.name).expect("a line of the registry");
+        recorded.subjects.iter_mut().for_each(Histogram::reset);
+        let empty = || Histogram::new(quantity.limit, quantity.signed);
+        recorded.subjects.resize_with(quantity.subjects(layout).len(), empty);
+    }
 }
 
 fn merge<R>(all: &mut [Recorded<R>], others: &[Recorded<R>]) {
@@ -651,6 +683,42 @@ mod tests {
         assert_eq!(delays(&sample::layout()), None);
         let shared = sample::layout().with_masters(vec![master(1), master(2)]);
         assert_eq!(delays(&shared), Some(3), "only those that are late");
+    }
+
+    #[test]
+    fn histograms_that_are_used_again_are_as_new() {
+        let a = |n| Address::new(n).unwrap();
+        let fill = |histograms: &mut Histograms| {
+            histograms.cycle(&sample::cycle(1));
+            histograms.slave(&sample::slave(1, 3));
+            histograms.link(&sample::link(1));
+        };
+        let figures = |histograms: &Histograms| -> Vec<_> {
+            let told = |(quantity, subject, found): (&Quantity, _, &Histogram)| {
+                let p50 = (found.percentile(50.0), found.magnitude_percentile(50.0));
+                (quantity.name, subject, found.count(), found.min(), found.mean(), p50)
+            };
+            histograms.iter().map(told).collect()
+        };
+        let slave = |n| SlaveLayout { address: a(n), t_i: Span::from_us(125), encoder: true };
+        let master = |n| MasterLayout { address: a(n), class: MasterClass::One, slaves: Vec::new() };
+        let shared = sample::layout().with_masters(vec![master(1), master(2)]);
+        let more = Layout::new(a(1), Span::from_ms(2), (3..9).map(slave).collect(), vec![(a(3), a(5)), (a(5), a(3))]);
+        let less = Layout::new(a(1), Span::from_ms(2), vec![slave(3)], Vec::new());
+        let mut used = Histograms::new(&sample::layout());
+        for layout in [sample::layout(), more, less, shared, sample::layout()] {
+            fill(&mut used);
+            used.reset(&layout);
+            let mut new = Histograms::new(&layout);
+            assert_eq!(used.layout(), new.layout());
+            assert_eq!(figures(&used), figures(&new));
+            fill(&mut used);
+            fill(&mut new);
+            assert_eq!(figures(&used), figures(&new));
+        }
+        let mut far = filled(&[-3, 7, 2_000_000_000, -2_000_000_000]);
+        far.reset();
+        assert_eq!((far.count(), far.below(), far.above(), far.max(), far.mean()), (0, 0, 0, None, None));
     }
 
     #[test]

@@ -4,6 +4,9 @@
 //! so what a scenario says is what the run has. A quantity that is not a whole number of its smallest step is refused
 //! with its two neighbours; only angles, of which most have no exact value, are rounded, once.
 
+use std::cmp::Ordering;
+use std::fmt;
+
 use crate::sim::motion::Angle;
 use crate::sim::share::Share;
 use crate::time::{BitRate, Span, Tbit};
@@ -323,6 +326,108 @@ impl Decimal {
     }
 }
 
+/// A number with the unit of any quantity, or with none, exact: for what compares and counts values without knowing which
+/// key they are for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Measure {
+    /// The unit as messages show it; empty without one.
+    pub unit: &'static str,
+    /// What it measures, with its article; empty without a unit.
+    pub noun: &'static str,
+    /// The number in steps of its kind, in lowest terms; the denominator is positive.
+    steps: (i128, i128),
+    /// Steps in one of the unit.
+    ratio: (i128, i128),
+}
+
+impl Measure {
+    /// The kinds whose units tell them apart.
+    const KINDS: [&'static Kind; 7] = [&TIME, &BITS, &LENGTH, &DEVIATION, &SPEED, &ANGLE, &RATE];
+    /// Most digits of a number: products of a few of them do not overflow.
+    const DIGITS: usize = 15;
+
+    /// Reads `"1.5 ms"`, `"1500 rpm"`, `"7"`; none if it is anything else, or a number of more than 15 digits.
+    pub fn read(text: &str) -> Option<Self> {
+        let (number, unit) = Decimal::split(text, &TIME).ok()?;
+        if number.digits.unsigned_abs().to_string().len() > Self::DIGITS || number.places as usize > Self::DIGITS {
+            return None;
+        }
+        let unit = SPELLINGS.iter().find(|(other, _)| *other == unit).map_or(unit, |&(_, usual)| usual);
+        let of_kind = |kind: &'static Kind| {
+            let &(unit, ratio) = kind.units.iter().find(|(name, _)| *name == unit)?;
+            Some((unit, kind.noun, ratio))
+        };
+        let none = unit.is_empty().then_some(("", "", (1, 1)));
+        let (unit, noun, ratio) = none.or_else(|| Self::KINDS.into_iter().find_map(of_kind))?;
+        Some(Self { unit, noun, steps: lowest(number.times(ratio)?), ratio })
+    }
+    /// The number of this kind's smallest steps, a fraction in lowest terms.
+    pub const fn steps(self) -> (i128, i128) {
+        self.steps
+    }
+    /// Another number of the same kind and unit; none if it is out of reach.
+    pub fn with_steps(self, (above, below): (i128, i128)) -> Option<Self> {
+        (below > 0 && above.unsigned_abs() < 1 << 100).then(|| Self { steps: lowest((above, below)), ..self })
+    }
+    /// The number in its unit, to the nearest `f64`.
+    pub fn value(self) -> f64 {
+        self.value_in(self)
+    }
+    /// The number in the unit of `other`, to the nearest `f64`.
+    pub fn value_in(self, other: Self) -> f64 {
+        let (above, below) = self.steps;
+        (above * other.ratio.1) as f64 / (below * other.ratio.0) as f64
+    }
+    /// The number in the unit of `other` with its decimals; none if it has no end.
+    pub fn decimal_in(self, other: Self) -> Option<String> {
+        let (above, below) = self.steps;
+        let (mut above, mut below) = lowest((above.checked_mul(other.ratio.1)?, below.checked_mul(other.ratio.0)?));
+        let mut places = 0_usize;
+        while below > 1 {
+            let factor = [(10, 10), (2, 5), (5, 2)].into_iter().find(|&(divisor, _)| below % divisor == 0)?;
+            below /= factor.0;
+            above = above.checked_mul(10 / factor.0)?;
+            places += 1;
+        }
+        let (sign, digits) = (if above < 0 { "-" } else { "" }, format!("{:0>1$}", above.unsigned_abs(), places + 1));
+        let (whole, fraction) = digits.split_at(digits.len() - places);
+        Some(if places == 0 { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") })
+    }
+    /// Whether `other` measures the same.
+    pub fn is_like(self, other: Self) -> bool {
+        self.noun == other.noun
+    }
+    /// Which of two of the same kind is more; none if they are not.
+    pub fn compare(self, other: Self) -> Option<Ordering> {
+        let product = |(above, _): (i128, i128), (_, below): (i128, i128)| above.checked_mul(below);
+        let exact = product(self.steps, other.steps).zip(product(other.steps, self.steps));
+        let nearly = || self.value_in(other).total_cmp(&other.value());
+        self.is_like(other).then(|| exact.map_or_else(nearly, |(mine, theirs)| mine.cmp(&theirs)))
+    }
+}
+/// The unit's own number where it has an end, otherwise steps of time: `1.5 ms`, `18001 tick`.
+impl fmt::Display for Measure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.decimal_in(*self) {
+            Some(number) if self.unit.is_empty() => f.write_str(&number),
+            Some(number) => write!(f, "{number} {}", self.unit),
+            None if self.noun == TIME.noun && self.steps.1 == 1 => write!(f, "{} tick", self.steps.0),
+            None if self.unit.is_empty() => self.value().fmt(f),
+            None => write!(f, "{} {}", self.value(), self.unit),
+        }
+    }
+}
+
+/// The fraction without common factors.
+fn lowest((above, below): (i128, i128)) -> (i128, i128) {
+    let (mut a, mut b) = (above.unsigned_abs(), below.unsigned_abs());
+    while b != 0 {
+        (a, b) = (b, a % b);
+    }
+    let divisor = a.max(1) as i128;
+    (above / divisor, below / divisor)
+}
+
 /// Reads `text` as whole steps of `kind`.
 fn read(text: &str, kind: &Kind) -> Result<i128, QuantityError> {
     let (number, unit) = Decimal::split(text, kind)?;
@@ -388,6 +493,29 @@ mod tests {
         }
         for text in ["-0.1", "2", "1.1", "999999999999999999999999/0.000000000000000000000001"] {
             assert!(message(gain(text)).contains("is beyond the range of a gain, 0 to 1"), "{text}");
+        }
+    }
+
+    #[test]
+    fn measures_compare_across_units_and_print_in_their_own() {
+        let read = |text| Measure::read(text).unwrap();
+        for (less, more) in
+            [("999 us", "1 ms"), ("-1 ns", "0 s"), ("1 tick", "0.084 ns"), ("2", "10"), ("1 m", "101 cm")]
+        {
+            assert_eq!(read(less).compare(read(more)), Some(Ordering::Less), "{less}, {more}");
+            assert_eq!(read(more).compare(read(less)), Some(Ordering::Greater), "{less}, {more}");
+        }
+        assert_eq!(read("1000 us").compare(read("1 ms")), Some(Ordering::Equal));
+        assert_eq!(read("1 us").compare(read("1 m")), None);
+        assert_eq!(read("1").compare(read("1 m")), None);
+        for text in ["1.5 ms", "-0.25 ns", "1500 rpm", "7", "0.5", "12 Mbit/s", "30 tbit", "0.1 deg"] {
+            assert_eq!(read(text).to_string(), text);
+        }
+        assert_eq!(read("1.50 ms").decimal_in(read("1 us")).unwrap(), "1500");
+        assert_eq!(read("1 tick").decimal_in(read("1 us")), None);
+        assert_eq!(read("1 us").with_steps((12_001, 1)).unwrap().to_string(), "12001 tick");
+        for text in ["3..10", "12 parsec", "", "ms", "0.1234567890123456 s", "uniform"] {
+            assert_eq!(Measure::read(text), None, "{text}");
         }
     }
 

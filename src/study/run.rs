@@ -159,11 +159,10 @@ pub fn run<Q: Queue<NetworkEvent>>(
     });
     let draws = dir.is_some() && scenario.record.plots;
     let plots = draws.then(|| Plots::new(meta(scenario, &layout)));
-    let clocked = |slave| scenario.slave(slave).is_some_and(|slave| scenario.is_clocked(slave));
     let sinks = Sinks {
         histograms: Histograms::new(&layout),
         faults: FirstFaults::default(),
-        episodes: Episodes::new(&layout, clocked),
+        episodes: episodes(scenario, &layout),
         exports: exports.transpose()?,
         plots,
     };
@@ -250,7 +249,7 @@ fn stage(dir: &Path, pictures: Vec<(&str, String)>) -> Result<Vec<Staged>, Expor
 }
 
 /// How many cycles the run will have, about: a scenario in time starts up for a moment before the first.
-fn cycles(scenario: &Scenario) -> u64 {
+pub(super) fn cycles(scenario: &Scenario) -> u64 {
     match scenario.run.duration {
         Extent::Time(span) => span.div_floor(scenario.master.t_dp).max(0) as u64,
         Extent::Cycles(cycles) => cycles,
@@ -265,6 +264,12 @@ pub fn layout(scenario: &Scenario) -> Layout {
         .collect();
     let links = scenario.links.iter().map(|link| (link.publisher, link.subscriber)).collect();
     Layout::new(scenario.master.address, scenario.master.t_dp, slaves, links).with_masters(masters(scenario))
+}
+
+/// What becomes of disturbances, before any is seen.
+pub(super) fn episodes(scenario: &Scenario, layout: &Layout) -> Episodes {
+    let clocked = |slave| scenario.slave(slave).is_some_and(|slave| scenario.is_clocked(slave));
+    Episodes::new(layout, clocked)
 }
 
 /// Nobody where there is one only.

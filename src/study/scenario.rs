@@ -21,11 +21,11 @@ pub mod kinds;
 mod link;
 mod options;
 mod read;
-mod section;
+pub(super) mod section;
 mod services;
 mod station;
 pub mod topology;
-mod tree;
+pub(super) mod tree;
 
 use check::Check;
 pub use class2::{Class2, Class2Job};
@@ -52,6 +52,7 @@ use crate::wire::Address;
 use crate::wire::control::GlobalControl;
 pub use crate::wire::parameter::Format;
 pub use class1::Class1;
+pub(super) use read::TABLES_OF_ONE;
 use section::Reader;
 pub(super) use section::{nearest, suggestion};
 pub use services::{MasterServices, SlaveServices};
@@ -117,8 +118,8 @@ impl Scenario {
     pub const MAX_FILE: u64 = 4 << 20;
 
     /// Reads the file `path` with `overrides`, pairs of a dotted key and a value: `("master.t_o", "1.5 ms")`,
-    /// `("slave.3.crystal", "20 ppm")` by address, `("link.1.length", "2")` by number from 1. A value is TOML if it can
-    /// be and a text otherwise.
+    /// `("slave.3.crystal", "20 ppm")` by address, `("slave.#1.addresses", "3..6")` and `("link.1.length", "2")` by the
+    /// table's number from 1. A value is TOML if it can be and a text otherwise.
     ///
     /// # Errors
     /// The file cannot be read, is no text, too long or empty, or [`Self::parse`] finds something wrong.
@@ -148,7 +149,7 @@ impl Scenario {
         Self::read(&Origin { dir, name: &name, source: &source }, &text, overrides, check)
     }
     /// Name, source and text of a file.
-    fn text_of(path: &Path) -> Result<(String, String, String), ScenarioError> {
+    pub(super) fn text_of(path: &Path) -> Result<(String, String, String), ScenarioError> {
         let source = path.display().to_string();
         let octets = read_file(path, "scenario", "name one scenario file in it, *.toml")
             .map_err(|fault| ScenarioError::about_file(&source, fault))?;

@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 
+use super::disturbance::{Scene, disturbance};
 use super::draw::Draw;
 use isodp::fdl::params::BusParams;
 use isodp::study::plan::proposal::Proposal;
@@ -24,8 +25,8 @@ const DRIVES: [&str; 2] = ["\"subscriber-drive\"", "\"coupled-drive\""];
 
 /// A slave of the scenario being drawn.
 #[derive(Clone, Copy)]
-struct Member {
-    address: u8,
+pub(super) struct Member {
+    pub(super) address: u8,
     /// Address of its master.
     master: u8,
     device: &'static str,
@@ -56,18 +57,19 @@ impl Case {
 }
 
 /// What is drawn before the times are known.
-struct Network {
-    clocked: bool,
+pub(super) struct Network {
+    pub(super) clocked: bool,
     master: u8,
     class1: Vec<u8>,
     class2: Vec<u8>,
-    slaves: Vec<Member>,
+    pub(super) slaves: Vec<Member>,
     /// Everything but `[run]` and the times of `[master]`.
     stations: String,
     /// Keys of `[master]` but times.
     master_keys: String,
     bus: String,
     rate: BitRate,
+    pub(super) places: Places,
 }
 
 /// The scenario of this seed, or why not even its network can be planned.
@@ -176,14 +178,16 @@ fn network(draw: &mut Draw) -> Network {
     }
     let bus = format!("rate = \"{name}\"\nhsa = {hsa}\ngap_factor = {}\n{}", draw.one(&[1, 1, 2, 5]), places.bus(rate));
     let master_keys = master_keys(draw, clocked, &places);
-    Network { clocked, master, class1, class2, slaves, stations, master_keys, bus, rate }
+    Network { clocked, master, class1, class2, slaves, stations, master_keys, bus, rate, places }
 }
 
 /// Where stations can be.
-struct Places {
-    segments: Vec<&'static str>,
+pub(super) struct Places {
+    pub(super) segments: Vec<&'static str>,
+    /// Names of what joins them.
+    pub(super) repeaters: Vec<String>,
     text: String,
-    cable_m: i64,
+    pub(super) cable_m: i64,
 }
 
 impl Places {
@@ -213,7 +217,7 @@ impl Places {
 fn places(draw: &mut Draw, rate: BitRate) -> Places {
     if draw.percent(55) {
         let cable_m = if rate == BitRate::M1_5 { draw.within(0..=190) } else { draw.within(0..=100) };
-        return Places { segments: Vec::new(), text: String::new(), cable_m };
+        return Places { segments: Vec::new(), repeaters: Vec::new(), text: String::new(), cable_m };
     }
     let segments = ["one", "two", "three", "four"][..draw.within(2..=4) as usize].to_vec();
     let cable_m = draw.within(1..=100);
@@ -221,8 +225,10 @@ fn places(draw: &mut Draw, rate: BitRate) -> Places {
     for segment in &segments {
         let _ = writeln!(text, "[[segment]]\nname = \"{segment}\"\ncable = \"{cable_m} m\"");
     }
+    let mut repeaters = Vec::new();
     for (i, to) in segments.iter().enumerate().skip(1) {
         let from = draw.one(&segments[..i]);
+        repeaters.push(format!("{from} - {to}"));
         let kind = draw.one(&["repeater", "olm", "ilm"]);
         let _ = writeln!(text, "[[repeater]]\nkind = \"{kind}\"\nfrom = \"{from}\"\nto = \"{to}\"");
         if draw.percent(50) {
@@ -233,7 +239,7 @@ fn places(draw: &mut Draw, rate: BitRate) -> Places {
             let _ = writeln!(text, "fibre = \"{} m\"", draw.within(0..=longest));
         }
     }
-    Places { segments, text, cable_m }
+    Places { segments, repeaters, text, cable_m }
 }
 
 fn crystal(draw: &mut Draw) -> String {
@@ -392,6 +398,14 @@ fn jobs(draw: &mut Draw, network: &Network, asking: &[u8]) -> String {
 }
 
 impl Network {
+    /// All masters.
+    pub(super) fn masters(&self) -> Vec<u8> {
+        [&[self.master][..], &self.class1, &self.class2].concat()
+    }
+    /// The slaves of the first master.
+    pub(super) fn own(&self) -> impl Iterator<Item = &Member> {
+        self.slaves.iter().filter(|slave| slave.master == self.master)
+    }
     /// Class 2 masters sit where the first segment begins.
     fn place_of_tools(&self) -> String {
         if self.stations.starts_with("[[segment]]") { "segment = \"one\"\n".to_owned() } else { String::new() }
@@ -462,8 +476,9 @@ fn happenings(draw: &mut Draw, network: &Network, cycle: Span, (from, to): (Span
         }
     }
     back_in_order(&mut text, &patched, to, cycle);
-    for _ in 0..draw.one(&[0, 0, 1, 2, 3]) {
-        at_risk |= disturbance(draw, &mut text, network, (60, 60 + length));
+    let scene = Scene { network, cycles: (60, 60 + length), times: (from, to), cycle };
+    for _ in 0..draw.one(&[0, 0, 1, 2, 3, 5]) {
+        at_risk |= disturbance(draw, &mut text, &scene);
     }
     (text, at_risk)
 }
@@ -483,27 +498,4 @@ fn back_in_order(text: &mut String, patched: &[u8], to: Span, cycle: Span) {
     order(text, to, "do = \"operate\"");
     order(text, to, "do = \"control-word\"\nvalue = 0\nslaves = \"all\"");
     order(text, to, "do = \"acknowledge\"\nslaves = \"all\"");
-}
-
-/// One disturbance within these cycles. Whether it may cost a token.
-fn disturbance(draw: &mut Draw, text: &mut String, network: &Network, (from, to): (i64, i64)) -> bool {
-    let first = draw.within(from..=to - 20);
-    let count = draw.within(1..=(to - first - 5).min(15));
-    let bursts = format!("cycle = {first}\nfor = {count}\n");
-    if network.clocked && draw.percent(40) {
-        let _ = write!(text, "[[disturbance]]\nkind = \"missing-clocks\"\n{bursts}");
-        return false;
-    }
-    let slave = draw.one(&network.slaves).address;
-    let masters = [&[network.master][..], &network.class1].concat();
-    let (whom, risk) = match draw.within(0..=4) {
-        0 => (format!("from = {slave}\n"), false),
-        // A token counts as taken when its next holder is heard: what one asks then may be lost.
-        1 => (format!("to = {slave}\n"), true),
-        2 => (format!("from = {slave}\nservice = \"data-exchange\"\n"), false),
-        3 => (format!("from = {}\n", draw.one(&masters)), true),
-        _ => (String::new(), true),
-    };
-    let _ = write!(text, "[[disturbance]]\nkind = \"lost-telegrams\"\n{whom}{bursts}");
-    risk
 }

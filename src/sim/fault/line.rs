@@ -157,6 +157,17 @@ impl Line {
         self.faults.push(OnLine { number, window, fault, counter: Counter::default(), draws });
         self.strikes.reserve(self.faults.len());
     }
+    /// Goes on counting and drawing where `before` is. `same` tells under which number a disturbance was there.
+    pub(super) fn go_on_from(&mut self, before: &Self, same: impl Fn(u16) -> Option<usize>) {
+        self.classifier = before.classifier.clone();
+        for fault in &mut self.faults {
+            let number = same(fault.number);
+            if let Some(old) = before.faults.iter().find(|old| Some(usize::from(old.number)) == number) {
+                fault.counter = old.counter;
+                fault.draws.clone_from(&old.draws);
+            }
+        }
+    }
     /// Whether there are any.
     pub const fn is_idle(&self) -> bool {
         self.faults.is_empty()
@@ -334,6 +345,27 @@ mod tests {
             lost.push(line.strikes().first().map(|strike| strike.number));
         }
         assert_eq!(lost, [Some(0), Some(0), Some(1), None, None, Some(1), None, None, Some(1)]);
+    }
+
+    #[test]
+    fn one_that_stays_goes_on_where_it_was() {
+        let pattern = LineFault { manner: Manner::Pattern(Pattern::parse("..x").unwrap()), ..all(Effect::Lost) };
+        let by_chance = ("chance", Window::Always, some(2, Effect::Twice { after: US }));
+        let frame = reply(4);
+        let judge = |line: &mut Line| {
+            line.judge((Time::ZERO, 0), &Sent { sender: address(4), clock: false, octets: frame.octets() });
+            line.strikes().iter().map(|strike| strike.what).collect::<Vec<_>>()
+        };
+        let mut old = line(&[("a", Window::Always, pattern), by_chance], &[4]);
+        (0..10).for_each(|_| drop(judge(&mut old)));
+        let mut new = line(&[by_chance, ("a", Window::Always, pattern)], &[4]);
+        new.go_on_from(&old, |number| Some(1 - usize::from(number)));
+        for _ in 0..20 {
+            let (mut before, mut now) = (judge(&mut old), judge(&mut new));
+            before.sort_by_key(|what| *what == Struck::Lost);
+            now.sort_by_key(|what| *what == Struck::Lost);
+            assert_eq!(before, now);
+        }
     }
 
     #[test]

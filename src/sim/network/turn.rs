@@ -58,7 +58,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
     }
     /// From now on these are the disturbances that begin and end. One that was there before goes on as it is, any other
-    /// begins where its window is now; what comes once at a beginning that is past does not come.
+    /// begins where its window is now.
     pub(super) fn turn_over(&mut self, all: Vec<fault::Turning>) {
         let known = |turning: &Turning<_>, new: &fault::Turning| {
             !turning.retired
@@ -76,9 +76,6 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 continue;
             }
             new.turns = Turns::from(new.turns.window(), self.now, self.clocks);
-            if new.source.as_ref().is_some_and(|source| !source.goes_on()) {
-                new.turns.leave_out_past(self.now, self.clocks);
-            }
             self.add_turning(new);
         }
     }
@@ -109,7 +106,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             self.push(self.now, Phase::Command, slot, Event::Turn(index as u16));
         }
     }
-    pub(super) fn slot_of(&self, station: Address) -> Option<usize> {
+    fn slot_of(&self, station: Address) -> Option<usize> {
         self.by_address[usize::from(station.get())].map(usize::from)
     }
     /// What the disturbance of this number, from 0, orders when a burst begins and when one ends.

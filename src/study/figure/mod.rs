@@ -68,6 +68,10 @@ impl Figures {
     pub const fn episodes(&self) -> &Episodes {
         &self.episodes
     }
+    /// What was recorded, for its memory to serve again.
+    pub fn into_histograms(self) -> Histograms {
+        self.histograms
+    }
     /// The network that these are of.
     pub fn layout(&self) -> &Layout {
         self.histograms.layout()

@@ -17,6 +17,8 @@ pub(super) enum Scale {
     Counts,
     /// Linear up to this magnitude, logarithmic beyond, both signs.
     Symmetric(f64),
+    /// Logarithm of values above zero.
+    Logarithm,
 }
 
 /// One axis.
@@ -57,9 +59,15 @@ impl Axis {
         Self { name: name.into(), lo: -hi, hi, scale: Scale::Symmetric(linear) }
     }
 
+    /// From `lo` to `hi`, both above zero, logarithmic, with a little air on both ends.
+    pub(super) fn logarithm(name: impl Into<String>, lo: f64, hi: f64) -> Self {
+        Self { name: name.into(), lo: lo / 1.1, hi: hi * 1.1, scale: Scale::Logarithm }
+    }
+
     fn bend(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Linear => value,
+            Scale::Logarithm => libm::log10(value.max(self.lo)),
             Scale::Counts => libm::log10(1.0 + value.max(0.0)),
             Scale::Symmetric(linear) => {
                 let size = value.abs() / linear;
@@ -78,6 +86,7 @@ impl Axis {
     fn ticks(&self, most: usize) -> Vec<(f64, String)> {
         match self.scale {
             Scale::Linear => linear_ticks(self.lo, self.hi, most),
+            Scale::Logarithm => logarithmic_ticks(self.lo, self.hi, most),
             Scale::Counts => {
                 let decades: Vec<f64> = decades(1.0, self.hi);
                 thin(std::iter::once(0.0).chain(decades).collect(), most)
@@ -97,6 +106,21 @@ impl Axis {
 fn decades(from: f64, to: f64) -> Vec<f64> {
     let next = |value: &f64| Some(value * 10.0);
     std::iter::successors(Some(from), next).take_while(|&value| value <= to * 1.000_001).collect()
+}
+
+/// 1, 2, 5 and 10 of every decade as far as there is room, otherwise 1 alone.
+fn logarithmic_ticks(lo: f64, hi: f64, most: usize) -> Vec<(f64, String)> {
+    let from = libm::floor(libm::log10(lo)) as i32;
+    let values = |parts: &'static [f64]| {
+        let decade = move |decade: i32| parts.iter().map(move |part| part * libm::exp10(f64::from(decade)));
+        let inside = (from..from + 40).flat_map(decade).filter(|value| (lo..=hi).contains(value));
+        inside.collect::<Vec<_>>()
+    };
+    let fitting =
+        [&[1.0, 2.0, 5.0][..], &[1.0, 3.0][..]].into_iter().map(values).find(|values| values.len() <= most.max(3));
+    let values = fitting.unwrap_or_else(|| values(&[1.0]));
+    let each = values.len().div_ceil(most.max(2)).max(1);
+    values.into_iter().step_by(each).map(|value| (value, short(value))).collect()
 }
 
 fn thin(values: Vec<f64>, most: usize) -> Vec<(f64, String)> {
@@ -335,6 +359,16 @@ mod tests {
         assert_eq!(labels(0.0, 2_000.0, 5), ["0", "500", "1000", "1500", "2000"]);
         assert_eq!(labels(-0.2, 0.3, 5), ["-0.2", "-0.1", "0.0", "0.1", "0.2", "0.3"]);
         assert_eq!(labels(0.0, 1.0, 4), ["0.00", "0.25", "0.50", "0.75", "1.00"]);
+    }
+
+    #[test]
+    fn logarithmic_ticks_are_as_many_as_have_room() {
+        let labels = |lo, hi, most| logarithmic_ticks(lo, hi, most).into_iter().map(|tick| tick.1).collect::<Vec<_>>();
+        assert_eq!(labels(0.9, 11.0, 5), ["1", "2", "5", "10"]);
+        assert_eq!(labels(90.0, 1_100.0, 3), ["100", "300", "1000"]);
+        assert_eq!(labels(0.5, 200_000.0, 6), ["1", "10", "100", "1000", "10000", "100 000"]);
+        let axis = Axis::logarithm("", 1.0, 100.0);
+        assert!((axis.position(10.0) - 0.5).abs() < 1e-12);
     }
 
     #[test]

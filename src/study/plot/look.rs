@@ -297,24 +297,16 @@ pub(super) struct Words<'a> {
     pub(super) plotted: &'a str,
 }
 
-/// Draws one picture: the words, and `body` in the area that they leave.
+/// Draws one picture of a run: the words, and `body` in the area that they leave.
 pub(super) fn page(
     meta: &PlotMeta,
     words: &Words<'_>,
     body_height: i32,
     body: impl FnOnce(&mut Canvas<'_>, Area),
 ) -> Result<String, String> {
-    const TITLE: i32 = 22;
-    const SUBTITLE: i32 = 13;
-    const FOOTER: i32 = 11;
-    let room = WIDTH - 2 * MARGIN;
-    let subtitle = wrap(&format!("Scenario {}: {}", meta.scenario, words.subtitle), SUBTITLE, room);
-    let top = MARGIN + TITLE + 12 + subtitle.len() as i32 * (SUBTITLE + 5);
-    let bottom = top + body_height;
-    let height = bottom + FOOTER + 2 * MARGIN;
     let footer = format!(
         "isodp | scenario {}, seed {}, {} {}, {}, {} | {}",
-        fit(&meta.scenario, FOOTER, room / 3),
+        fit(&meta.scenario, FOOTER, ROOM / 3),
         meta.seed,
         meta.cycle,
         meta.t_dp,
@@ -322,15 +314,37 @@ pub(super) fn page(
         meta.duration,
         words.plotted
     );
+    sheet(words.title, &format!("Scenario {}: {}", meta.scenario, words.subtitle), &footer, body_height, body)
+}
+
+/// Text at the foot of a picture [px].
+const FOOTER: i32 = 11;
+/// Width between the margins [px].
+const ROOM: i32 = WIDTH - 2 * MARGIN;
+
+/// Draws one picture: title, subtitle and footer, and `body` in the area that they leave.
+pub(super) fn sheet(
+    title: &str,
+    subtitle: &str,
+    footer: &str,
+    body_height: i32,
+    body: impl FnOnce(&mut Canvas<'_>, Area),
+) -> Result<String, String> {
+    const TITLE: i32 = 22;
+    const SUBTITLE: i32 = 13;
+    let subtitle = wrap(subtitle, SUBTITLE, ROOM);
+    let top = MARGIN + TITLE + 12 + subtitle.len() as i32 * (SUBTITLE + 5);
+    let bottom = top + body_height;
+    let height = bottom + FOOTER + 2 * MARGIN;
     draw(height, |canvas| {
         canvas.fill(Area { left: 0, top: 0, right: WIDTH, bottom: height }, WHITE);
-        canvas.text((MARGIN, MARGIN), &fit(words.title, TITLE, room), Font::new(TITLE).below().bold());
+        canvas.text((MARGIN, MARGIN), &fit(title, TITLE, ROOM), Font::new(TITLE).below().bold());
         for (index, line) in subtitle.iter().enumerate() {
             let y = MARGIN + TITLE + 10 + index as i32 * (SUBTITLE + 5);
             canvas.text((MARGIN, y), line, Font::new(SUBTITLE).below().ink(GREY));
         }
         body(canvas, Area { left: MARGIN, top, right: WIDTH - MARGIN, bottom });
-        let footer = fit(&footer, FOOTER, room);
+        let footer = fit(footer, FOOTER, ROOM);
         canvas.path(&[(MARGIN, bottom + MARGIN - 8), (WIDTH - MARGIN, bottom + MARGIN - 8)], PALE, 1);
         canvas.text((MARGIN, bottom + MARGIN), &footer, Font::new(FOOTER).below().ink(GREY));
     })

@@ -24,6 +24,7 @@ mod pll_convergence;
 mod position;
 mod publish_latency;
 mod recovery;
+pub mod sweep;
 mod synch_delay;
 mod t_dp_deviation;
 mod telegrams;

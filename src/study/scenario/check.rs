@@ -65,6 +65,7 @@ static STAGES: &[Stage] = &[
     Stage::own(&[
         disturbance_stations,
         disturbance::station::are_there,
+        disturbance::station::come_back,
         disturbance::application::are_slaves,
         disturbance::clock::are_crystals,
         disturbance::token::are_masters,

@@ -95,7 +95,7 @@ pub const COMMON: &[Key] = &[
         name: "for",
         unit: "time or cycles",
         default: "to the end",
-        what: "how long it lasts, counted as its beginning",
+        what: "how long it lasts, counted as its beginning; cycles stand still while [master] begins none",
     },
     Key { name: "every", unit: "time or cycles", default: "once", what: "distance from one beginning to the next" },
     Key { name: "times", unit: "number", default: "for ever", what: "how often it comes with every" },

@@ -1088,6 +1088,17 @@ good.toml:45:9: disturbance.1.every: 1 ms is too short
 "#,
         ),
         (
+            "kind = \"missing-clocks\"",
+            "kind = \"restart\"\nstation = 2",
+            r#"
+good.toml:45:7: disturbance.1.for: the supply of [master], station 2, would never return
+  45 | for = 1
+     |       ^
+  rule: cycles are those of [master], and without supply it begins none
+  help: at and for as times, such as at = "1 s", for = "20 ms"
+"#,
+        ),
+        (
             "every = 100",
             "every = 100\nname = \"x\"\n[[disturbance]]\nkind = \"missing-clocks\"\nname = \"x\"",
             r#"
@@ -1098,6 +1109,55 @@ good.toml:49:8: disturbance.2.name: two disturbances are called "x"
 "#,
         ),
     ]);
+}
+
+/// What is said of a disturbance with these keys in the place of that of the good file, without the lines that show it.
+fn said_of_disturbance(keys: &str) -> String {
+    let begin = GOOD.find("kind = \"missing-clocks\"").unwrap();
+    let end = GOOD.find("\n[record]").unwrap();
+    let text = [&GOOD[..begin], keys, "\n", &GOOD[end..]].concat();
+    match parse(&text, &[]) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("nothing is said of {keys}"),
+    }
+}
+
+#[test]
+fn disturbances_of_the_line_that_cannot_be() {
+    for (keys, expected) in [
+        ("kind = \"lost-telegrams\"\nrate = \"1 %\"\ntelegrams = 3", "rate, telegrams and pattern exclude each other"),
+        ("kind = \"lost-telegrams\"\nrate = \"101 %\"", "is beyond the range of a share, 0 to 1"),
+        ("kind = \"lost-telegrams\"\npattern = \"xo\"", "1 to 64 characters, x for a telegram that is meant"),
+        ("kind = \"lost-telegrams\"\nservice = \"tokens\"", "did you mean \"token\"?"),
+        ("kind = \"late-telegrams\"", "late either by a time or by anything up to a time"),
+        (
+            "kind = \"late-telegrams\"\nby = \"1 us\"\nup_to = \"1 us\"",
+            "late either by a time or by anything up to a time",
+        ),
+        ("kind = \"late-telegrams\"\nby = \"-1 us\"", "-1 us is negative"),
+        ("kind = \"bit-errors\"", "for example: rate = \"1e-6\""),
+        ("kind = \"bit-errors\"\nrate = \"1e-16\"", "is not a whole number of parts in 10^15"),
+        ("kind = \"wrong-octet\"", "disturbance.1.octet: this key is missing"),
+        ("kind = \"wrong-octet\"\noctet = 0", "0 is out of range"),
+        ("kind = \"wrong-octet\"\noctet = 8\nflip = 0", "a whole number from 1 to 255"),
+        ("kind = \"wrong-octet\"\noctet = 8\nparity = \"bad\"", "there is no parity \"bad\""),
+        ("kind = \"noise\"\nmean = \"0 us\"", "noise that never pauses is no noise"),
+        ("kind = \"noise\"\noctets = 4\noctets_to = 3", "a whole number from 4 to 255"),
+        ("kind = \"noise\"\nnear = 77", "disturbance.1.near: there is no slave 77"),
+        ("kind = \"foreign-telegram\"", "given by octets, token or data, and by one of them only"),
+        ("kind = \"foreign-telegram\"\noctets = \"DC 2\"\ntoken = { to = 2, from = 5 }", "by one of them only"),
+        ("kind = \"foreign-telegram\"\noctets = \"DC 102 5\"", "1 to 255 octets in hexadecimal"),
+        ("kind = \"foreign-telegram\"\noctets = \"\"", "these are no octets of a telegram"),
+        ("kind = \"foreign-telegram\"\ntoken = { to = 2 }", "token.from: this key is missing"),
+        ("kind = \"foreign-telegram\"\ntoken = { to = 200, from = 5 }", "a whole number from 0 to 127"),
+        ("kind = \"foreign-telegram\"\ndata = { to = 2, from = 5, fc = 0x41 }", "frame control 41 is not assigned"),
+        ("kind = \"foreign-telegram\"\ndata = { to = 2, from = 5, sap = 60 }", "did you mean \"dsap\"?"),
+        ("kind = \"late-token\"\nstation = 3\nby = \"1 us\"", "station 3 is a slave"),
+        ("kind = \"late-token\"\nstation = 2", "for example: by = \"200 us\""),
+    ] {
+        let said = said_of_disturbance(keys);
+        assert!(said.contains(expected), "{keys}\n{said}");
+    }
 }
 
 #[test]

@@ -49,6 +49,8 @@ const TABLES: [&str; 13] = [
 ];
 /// How many of [`TABLES`] are single tables.
 const SINGLE: usize = 5;
+/// The single tables.
+pub(in crate::study) const TABLES_OF_ONE: &[&str] = TABLES.split_at(SINGLE).0;
 
 /// A slave's table after its list of addresses has been written out: one per slave.
 struct SlaveTable {
@@ -62,6 +64,7 @@ struct SlaveTable {
 /// Reads everything. `None` if something is missing or wrong; the reader knows what.
 pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scenario> {
     unknown_tables(reader, &root);
+    overrides_of_groups(reader, &mut root);
     let mut slave_tables = slave_tables(reader, &root);
     overrides(reader, &mut root, &mut slave_tables);
     let run = run(Section::of_file(reader, &root, "run"), reader);
@@ -236,6 +239,23 @@ pub(super) fn address_list(node: &Node) -> Result<Vec<Address>, Fault> {
     Ok(all)
 }
 
+/// Puts every override of a whole `[[slave]]` table, `slave.#1.addresses`, into it before its addresses are written out.
+fn overrides_of_groups(reader: &mut Reader<'_>, root: &mut Table) {
+    let source = reader.source;
+    for set in &source.sets {
+        let path: Vec<&str> = set.path.iter().map(String::as_str).collect();
+        let ["slave", group, ref rest @ ..] = path[..] else { continue };
+        let Some(number) = group.strip_prefix('#') else { continue };
+        let result = match entry(root, "slave", number) {
+            Some(table) => put(table, rest, &set.node),
+            None => Err(Fault::new(format!("there is no [[slave]] number \"{number}\"")).help("the first is slave.#1")),
+        };
+        if let Err(fault) = result {
+            reader.complain(set.node.place, &set.path.join("."), fault);
+        }
+    }
+}
+
 /// Puts every override into its table.
 fn overrides(reader: &mut Reader<'_>, root: &mut Table, slaves: &mut [SlaveTable]) {
     let source = reader.source;
@@ -243,6 +263,7 @@ fn overrides(reader: &mut Reader<'_>, root: &mut Table, slaves: &mut [SlaveTable
         let path: Vec<&str> = set.path.iter().map(String::as_str).collect();
         let key = set.path.join(".");
         let result = match path[..] {
+            ["slave", group, ..] if group.starts_with('#') => Ok(()),
             ["slave", station, ref rest @ ..] => {
                 if let Some(slave) = slaves.iter_mut().find(|slave| slave.address.to_string() == station) {
                     put(&mut slave.table, rest, &set.node)
@@ -282,7 +303,8 @@ fn entry<'t>(root: &'t mut Table, name: &str, index: &str) -> Option<&'t mut Tab
 }
 
 /// Keys of which one takes the other's place when it is overridden.
-const INSTEAD: [(&str, &str); 3] = [("duration", "cycles"), ("at", "cycle"), ("slave", "slaves")];
+const INSTEAD: [(&str, &str); 4] =
+    [("duration", "cycles"), ("at", "cycle"), ("slave", "slaves"), ("address", "addresses")];
 
 /// Puts `node` at `path` under `table`; what is neither table nor list on the way becomes a table. Entries of lists are
 /// counted from 1.

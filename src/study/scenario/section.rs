@@ -12,14 +12,14 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 
 /// Reads a scenario: collects problems and where every key was found.
-pub(super) struct Reader<'a> {
-    pub(super) source: &'a Source<'a>,
+pub(in crate::study) struct Reader<'a> {
+    pub(in crate::study) source: &'a Source<'a>,
     /// Place of each key's value that was given, by the key's path.
-    pub(super) places: BTreeMap<String, Place>,
+    pub(in crate::study) places: BTreeMap<String, Place>,
     /// GSD files that were read for it.
     pub(super) gsd_files: super::gsd::Files,
     /// Whether T_DP, T_I and T_O may be missing: they are to be proposed.
-    pub(super) proposes: bool,
+    pub(in crate::study) proposes: bool,
     /// What disturbances can be about.
     pub(super) around: Around,
     problems: Vec<(Place, String, Fault)>,
@@ -35,7 +35,7 @@ pub(super) struct Around {
 
 impl<'a> Reader<'a> {
     /// A reader of `source` that has read nothing yet.
-    pub(super) const fn new(source: &'a Source<'a>) -> Self {
+    pub(in crate::study) const fn new(source: &'a Source<'a>) -> Self {
         Self {
             source,
             places: BTreeMap::new(),
@@ -46,7 +46,7 @@ impl<'a> Reader<'a> {
         }
     }
     /// Notes that `key` at `place` is wrong. The same fault of the same value, shared by several slaves, is noted once.
-    pub(super) fn complain(&mut self, place: Place, key: &str, fault: Fault) {
+    pub(in crate::study) fn complain(&mut self, place: Place, key: &str, fault: Fault) {
         let same = |(at, _, other): &(Place, String, Fault)| {
             *at == place && (*other == fault || (!fault.rule.is_empty() && other.rule == fault.rule))
         };
@@ -55,21 +55,21 @@ impl<'a> Reader<'a> {
         }
     }
     /// As [`Self::complain`] unless something else is wrong there already.
-    pub(super) fn complain_first(&mut self, place: Place, key: &str, fault: Fault) {
+    pub(in crate::study) fn complain_first(&mut self, place: Place, key: &str, fault: Fault) {
         if place == Place::Missing || self.problems.iter().all(|&(at, ..)| at != place) {
             self.complain(place, key, fault);
         }
     }
     /// The place of the first of `keys` that was given.
-    pub(super) fn place(&self, keys: &[&str]) -> Place {
+    pub(in crate::study) fn place(&self, keys: &[&str]) -> Place {
         keys.iter().find_map(|&key| self.places.get(key).copied()).unwrap_or(Place::Missing)
     }
     /// Whether anything is wrong so far.
-    pub(super) fn has_problems(&self) -> bool {
+    pub(in crate::study) fn has_problems(&self) -> bool {
         !self.problems.is_empty()
     }
     /// All problems in the order of the file, and forgets them.
-    pub(super) fn take_problems(&mut self) -> Vec<Problem> {
+    pub(in crate::study) fn take_problems(&mut self) -> Vec<Problem> {
         self.problems.sort_by_key(|&(place, ..)| place);
         let mut problems: Vec<_> =
             self.problems.drain(..).map(|(place, key, fault)| self.source.problem(place, &key, fault)).collect();
@@ -79,7 +79,7 @@ impl<'a> Reader<'a> {
 }
 
 /// One table.
-pub(super) struct Section<'t> {
+pub(in crate::study) struct Section<'t> {
     path: String,
     place: Place,
     table: Option<&'t Table>,
@@ -88,11 +88,11 @@ pub(super) struct Section<'t> {
 
 impl<'t> Section<'t> {
     /// The table at `path`; without one, all its keys are missing.
-    pub(super) fn new(path: impl Into<String>, place: Place, table: Option<&'t Table>) -> Self {
+    pub(in crate::study) fn new(path: impl Into<String>, place: Place, table: Option<&'t Table>) -> Self {
         Self { path: path.into(), place, table, asked: Vec::new() }
     }
     /// The table `name` of the file.
-    pub(super) fn of_file(reader: &mut Reader<'_>, root: &'t Table, name: &'static str) -> Self {
+    pub(in crate::study) fn of_file(reader: &mut Reader<'_>, root: &'t Table, name: &'static str) -> Self {
         match root.0.get(name) {
             Some((place, Node { value: Value::Table(table), .. })) => {
                 reader.places.insert(name.to_owned(), *place);
@@ -107,28 +107,32 @@ impl<'t> Section<'t> {
         }
     }
     /// Place of the table itself.
-    pub(super) const fn place(&self) -> Place {
+    pub(in crate::study) const fn place(&self) -> Place {
         self.place
     }
+    /// All of it, where any key may be.
+    pub(in crate::study) const fn all(&self) -> Option<&'t Table> {
+        self.table
+    }
     /// Whether `key` is there.
-    pub(super) fn has(&self, key: &str) -> bool {
+    pub(in crate::study) fn has(&self, key: &str) -> bool {
         self.node(key).is_some()
     }
     /// The value of `key`.
-    pub(super) fn node(&self, key: &str) -> Option<&'t Node> {
+    pub(in crate::study) fn node(&self, key: &str) -> Option<&'t Node> {
         self.table.and_then(|table| table.get(key))
     }
     /// The path of `key`.
-    pub(super) fn path_of(&self, key: &str) -> String {
-        format!("{}.{key}", self.path)
+    pub(in crate::study) fn path_of(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
     }
     /// Complains about the table as a whole.
-    pub(super) fn complain(&self, reader: &mut Reader<'_>, fault: Fault) {
+    pub(in crate::study) fn complain(&self, reader: &mut Reader<'_>, fault: Fault) {
         reader.complain(self.place, &self.path, fault);
     }
 
     /// The value of `key` as `read` makes it, `None` if it is not there or wrong.
-    pub(super) fn optional<T>(
+    pub(in crate::study) fn optional<T>(
         &mut self,
         reader: &mut Reader<'_>,
         key: &'static str,
@@ -141,7 +145,7 @@ impl<'t> Section<'t> {
         read(node).map_err(|fault| reader.complain(node.place, &path, fault)).ok()
     }
     /// As [`Self::optional`]; that it is not there is a problem too, and `example` shows what it could be.
-    pub(super) fn required<T>(
+    pub(in crate::study) fn required<T>(
         &mut self,
         reader: &mut Reader<'_>,
         key: &'static str,
@@ -155,7 +159,7 @@ impl<'t> Section<'t> {
         self.optional(reader, key, read)
     }
     /// The table under `key`.
-    pub(super) fn table(&mut self, reader: &mut Reader<'_>, key: &'static str) -> Option<Section<'t>> {
+    pub(in crate::study) fn table(&mut self, reader: &mut Reader<'_>, key: &'static str) -> Option<Section<'t>> {
         self.asked.push(key);
         let node = self.node(key)?;
         reader.places.insert(self.path_of(key), node.place);
@@ -166,8 +170,28 @@ impl<'t> Section<'t> {
         reader.complain(node.place, &self.path_of(key), fault);
         None
     }
+    /// The tables of the list under `key`, `[[key]]`, numbered from 1.
+    pub(in crate::study) fn list(&mut self, reader: &mut Reader<'_>, key: &'static str) -> Vec<Section<'t>> {
+        self.asked.push(key);
+        let Some(node) = self.node(key) else { return Vec::new() };
+        let items = match &node.value {
+            Value::List(items) => &items[..],
+            _ => std::slice::from_ref(node),
+        };
+        let mut sections = Vec::with_capacity(items.len());
+        for (index, item) in items.iter().enumerate() {
+            let path = format!("{}.{}", self.path_of(key), index + 1);
+            if let (Value::Table(table), Value::List(_)) = (&item.value, &node.value) {
+                sections.push(Self::new(path, item.place, Some(table)));
+            } else {
+                let fault = Fault::new(format!("this is {}", item.value.noun())).help(format!("write [[{key}]]"));
+                reader.complain(item.place, &path, fault);
+            }
+        }
+        sections
+    }
     /// The end of the table: every key that nobody has asked for is unknown.
-    pub(super) fn finish(self, reader: &mut Reader<'_>) {
+    pub(in crate::study) fn finish(self, reader: &mut Reader<'_>) {
         for (key, (place, _)) in self.table.iter().flat_map(|table| &table.0) {
             if !self.asked.contains(&key.as_str()) {
                 let open: Vec<_> = self.asked.iter().copied().filter(|asked| !self.has(asked)).collect();
@@ -196,7 +220,7 @@ pub(in crate::study) fn suggestion<'k>(word: &str, known: impl Iterator<Item = &
 }
 
 /// The row of `rows` whose name `node` is; `name` tells a row's name, `noun` what the rows are.
-pub(super) fn choice<T>(
+pub(in crate::study) fn choice<T>(
     node: &Node,
     noun: &str,
     rows: &'static [T],
@@ -218,7 +242,7 @@ fn shorten(word: &str) -> String {
 }
 
 /// A text.
-pub(super) fn text(node: &Node) -> Result<&str, Fault> {
+pub(in crate::study) fn text(node: &Node) -> Result<&str, Fault> {
     match &node.value {
         Value::Text(text) => Ok(text),
         other => Err(Fault::new(format!("this is {}", other.noun())).help("write a text in quotation marks")),
@@ -226,7 +250,7 @@ pub(super) fn text(node: &Node) -> Result<&str, Fault> {
 }
 
 /// `true` or `false`.
-pub(super) fn yes(node: &Node) -> Result<bool, Fault> {
+pub(in crate::study) fn yes(node: &Node) -> Result<bool, Fault> {
     match &node.value {
         Value::Bool(yes) => Ok(*yes),
         other => Err(Fault::new(format!("this is {}", other.noun())).help("write true or false")),
@@ -234,7 +258,7 @@ pub(super) fn yes(node: &Node) -> Result<bool, Fault> {
 }
 
 /// A whole number in `range`.
-pub(super) fn number<T>(range: RangeInclusive<T>) -> impl Fn(&Node) -> Result<T, Fault>
+pub(in crate::study) fn number<T>(range: RangeInclusive<T>) -> impl Fn(&Node) -> Result<T, Fault>
 where
     T: TryFrom<i128> + PartialOrd + Display + Copy,
 {
@@ -253,7 +277,7 @@ where
 }
 
 /// A number with its unit, read by `read`; `example` shows one.
-pub(super) fn quantity<T>(
+pub(in crate::study) fn quantity<T>(
     example: &'static str,
     read: impl Fn(&str) -> Result<T, QuantityError>,
 ) -> impl Fn(&Node) -> Result<T, Fault> {
@@ -268,7 +292,7 @@ pub(super) fn quantity<T>(
 }
 
 /// A time in a run: not negative, and not after the end of the longest run.
-pub(super) fn instant(node: &Node) -> Result<Span, Fault> {
+pub(in crate::study) fn instant(node: &Node) -> Result<Span, Fault> {
     match quantity("2 s", |text| span(text, None))(node)? {
         span if span < Span::ZERO => Err(Fault::new(format!("{span} is negative"))),
         span if span > Run::LONGEST => Err(Fault::new(format!("\"{}\" is after the end of every run", text(node)?))
@@ -279,7 +303,7 @@ pub(super) fn instant(node: &Node) -> Result<Span, Fault> {
 }
 
 /// A time in a bus cycle, with bit times at `rate`: not negative, and short enough to reckon with.
-pub(super) fn cycle_time(rate: BitRate) -> impl Fn(&Node) -> Result<Span, Fault> {
+pub(in crate::study) fn cycle_time(rate: BitRate) -> impl Fn(&Node) -> Result<Span, Fault> {
     move |node| match quantity("125 us", |text| span(text, Some(rate)))(node)? {
         span if span < Span::ZERO => Err(Fault::new(format!("{span} is negative"))),
         span if span > Span::from_s(1) => {

@@ -9,7 +9,7 @@ use toml::de::{DeTable, DeValue};
 
 /// Where a value stands.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) enum Place {
+pub(in crate::study) enum Place {
     /// In the file, from this octet to that.
     File(usize, usize),
     /// In the override with this index.
@@ -20,72 +20,110 @@ pub(super) enum Place {
 
 /// A value and its place.
 #[derive(Clone, PartialEq, Debug)]
-pub(super) struct Node {
-    pub(super) place: Place,
-    pub(super) value: Value,
+pub(in crate::study) struct Node {
+    pub(in crate::study) place: Place,
+    pub(in crate::study) value: Value,
 }
 
 /// A value.
 #[derive(Clone, PartialEq, Debug)]
-pub(super) enum Value {
+pub(in crate::study) enum Value {
     Text(String),
     /// `None` if it is beyond 128 bits.
     Integer(Option<i128>),
     Bool(bool),
     List(Vec<Node>),
     Table(Table),
-    /// A fraction or a date, which no key takes.
+    /// A number with a decimal point or an exponent, as it is written.
+    Fraction(String),
+    /// A date, which no key takes.
     Other(&'static str),
 }
 
 impl Value {
     /// The value's kind with its article.
-    pub(super) const fn noun(&self) -> &'static str {
+    pub(in crate::study) const fn noun(&self) -> &'static str {
         match self {
             Self::Text(_) => "a text",
             Self::Integer(_) => "a number",
             Self::Bool(_) => "true or false",
             Self::List(_) => "a list",
             Self::Table(_) => "a table",
+            Self::Fraction(_) => "a fraction",
             Self::Other(noun) => noun,
+        }
+    }
+    /// The value as a TOML literal on one line, tables sorted by key.
+    pub(in crate::study) fn literal(&self) -> String {
+        match self {
+            Self::Text(text) => quoted(text),
+            Self::Integer(number) => number.map_or_else(String::new, |number| number.to_string()),
+            Self::Bool(yes) => yes.to_string(),
+            Self::Fraction(text) => text.clone(),
+            Self::Other(noun) => (*noun).to_owned(),
+            Self::List(items) => {
+                let items: Vec<_> = items.iter().map(|item| item.value.literal()).collect();
+                format!("[{}]", items.join(", "))
+            }
+            Self::Table(Table(entries)) => {
+                let entry = |(key, (_, node)): (&String, &(Place, Node))| {
+                    let bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+                    let is_bare = !key.is_empty() && key.chars().all(bare);
+                    let key = if is_bare { key.clone() } else { quoted(key) };
+                    format!("{key} = {}", node.value.literal())
+                };
+                format!("{{ {} }}", entries.iter().map(entry).collect::<Vec<_>>().join(", "))
+            }
+        }
+    }
+    /// The value as an override has it: a text without quotation marks wherever it stays a text without them.
+    pub(in crate::study) fn as_override(&self) -> String {
+        match self {
+            Self::Text(text) if override_value(text, Place::Missing).value == *self => text.clone(),
+            other => other.literal(),
         }
     }
 }
 
+/// `text` as a TOML string.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
 /// Values by key, each with the place of the key.
 #[derive(Clone, PartialEq, Debug, Default)]
-pub(super) struct Table(pub(super) BTreeMap<String, (Place, Node)>);
+pub(in crate::study) struct Table(pub(in crate::study) BTreeMap<String, (Place, Node)>);
 
 impl Table {
     /// The value of `key`.
-    pub(super) fn get(&self, key: &str) -> Option<&Node> {
+    pub(in crate::study) fn get(&self, key: &str) -> Option<&Node> {
         self.0.get(key).map(|(_, node)| node)
     }
 }
 
 /// One `--set key=value`.
 #[derive(Clone, PartialEq, Debug)]
-pub(super) struct Set {
+pub(in crate::study) struct Set {
     /// The path, split at its dots.
-    pub(super) path: Vec<String>,
+    pub(in crate::study) path: Vec<String>,
     /// The assignment as it was given.
-    pub(super) text: String,
+    pub(in crate::study) text: String,
     /// The value.
-    pub(super) node: Node,
+    pub(in crate::study) node: Node,
 }
 
 /// A text with its name and its overrides: what places refer to.
-pub(super) struct Source<'a> {
+pub(in crate::study) struct Source<'a> {
     name: &'a str,
     text: &'a str,
     /// Where files are that the text names without a directory: where its own is.
-    pub(super) dir: &'a Path,
-    pub(super) sets: Vec<Set>,
+    pub(in crate::study) dir: &'a Path,
+    pub(in crate::study) sets: Vec<Set>,
 }
 
 impl<'a> Source<'a> {
     /// The source `text` called `name`, with overrides whose values are TOML where they can be and text otherwise.
-    pub(super) fn new(name: &'a str, text: &'a str, overrides: &[(String, String)]) -> Self {
+    pub(in crate::study) fn new(name: &'a str, text: &'a str, overrides: &[(String, String)]) -> Self {
         let set = |(index, (key, value)): (usize, &(String, String))| Set {
             path: key.split('.').map(|part| part.trim().to_owned()).collect(),
             text: format!("{key}={value}"),
@@ -94,14 +132,14 @@ impl<'a> Source<'a> {
         Self { name, text, dir: Path::new(""), sets: overrides.iter().enumerate().map(set).collect() }
     }
     /// The same with the files that the text names in `dir`.
-    pub(super) fn in_dir(self, dir: &'a Path) -> Self {
+    pub(in crate::study) fn in_dir(self, dir: &'a Path) -> Self {
         Self { dir, ..self }
     }
     /// Reads the text.
     ///
     /// # Errors
     /// The text is not TOML.
-    pub(super) fn parse(&self) -> Result<Table, ScenarioError> {
+    pub(in crate::study) fn parse(&self) -> Result<Table, ScenarioError> {
         match DeTable::parse(self.text) {
             Ok(table) => Ok(convert_table(table.get_ref(), None)),
             Err(error) => {
@@ -112,7 +150,7 @@ impl<'a> Source<'a> {
         }
     }
     /// The problem `fault` of `key` at `place`.
-    pub(super) fn problem(&self, place: Place, key: &str, fault: Fault) -> Problem {
+    pub(in crate::study) fn problem(&self, place: Place, key: &str, fault: Fault) -> Problem {
         let (source, position) = match place {
             Place::File(start, end) => (self.name.to_owned(), Some(position(self.text, start..end))),
             Place::Set(index) => (format!("--set \"{}\"", self.sets[index].text), None),
@@ -170,7 +208,7 @@ fn convert(value: &Spanned<DeValue<'_>>, place: Option<Place>) -> Node {
         DeValue::Boolean(yes) => Value::Bool(*yes),
         DeValue::Array(items) => Value::List(items.iter().map(|item| convert(item, place)).collect()),
         DeValue::Table(table) => Value::Table(convert_table(table, place)),
-        DeValue::Float(_) => Value::Other("a fraction"),
+        DeValue::Float(number) => Value::Fraction(number.as_str().to_owned()),
         DeValue::Datetime(_) => Value::Other("a date"),
     };
     Node { place: own, value }

@@ -10,7 +10,7 @@ use crate::study::quantity::span;
 use crate::study::scenario::check::about;
 use crate::study::scenario::error::Fault;
 use crate::study::scenario::section::{Reader, Section, instant, quantity, suggestion, text};
-use crate::study::scenario::topology::{Point, cable, station_segment};
+use crate::study::scenario::topology::{Point, Topology, cable, station_segment};
 use crate::study::scenario::tree::Node;
 use crate::time::Span;
 
@@ -118,8 +118,8 @@ pub(in crate::study::scenario) fn few_cuts(facts: &Facts<'_>, reader: &mut Reade
 
 /// The repeater that is meant, by its index.
 fn repeater(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<usize> {
-    let names: Vec<_> = reader.around.topology.iter().flat_map(|topology| topology.repeaters()).collect();
-    let names: Vec<_> = names.iter().map(|repeater| repeater.name.clone()).collect();
+    let repeaters = reader.around.topology.iter().flat_map(Topology::repeaters);
+    let names: Vec<_> = repeaters.map(|repeater| repeater.name.clone()).collect();
     section.required(reader, "repeater", "\"hall 1 - hall 2\"", |node| {
         let word = text(node)?;
         names.iter().position(|name| name == word).ok_or_else(|| {
@@ -155,7 +155,7 @@ pub(in crate::study::scenario) fn in_order(facts: &Facts<'_>, reader: &mut Reade
             _ => continue,
         };
         // A stray to the one side follows a stray to the other.
-        sum = sum + half_width.min(Span::from_s(1));
+        sum += half_width.min(Span::from_s(1));
         if sum * 2 >= idle {
             let fault = Fault::new(format!("telegrams may move against each other by {}", sum * 2))
                 .rule(format!(

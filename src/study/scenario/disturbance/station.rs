@@ -3,6 +3,7 @@
 use super::{DisturbanceKind, Key};
 use crate::sim::fault::What;
 use crate::sim::fault::station::StationFault;
+use crate::sim::fault::window::{Bursts, Window};
 use crate::study::plan::rules::Facts;
 use crate::study::scenario::check::about;
 use crate::study::scenario::error::Fault;
@@ -80,10 +81,27 @@ fn many(node: &Node, slaves: &[Address]) -> Result<Vec<Address>, Fault> {
     }
 }
 
+/// A master without supply begins no cycles, so that its return cannot be counted in them.
+pub(in crate::study::scenario) fn come_back(facts: &Facts<'_>, reader: &mut Reader<'_>) {
+    let master = facts.scenario.master.address;
+    for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
+        let off = matches!(&disturbance.what, What::Station(all, StationFault::Restart) if all.contains(&master));
+        if off && matches!(disturbance.window, Window::Cycles(Bursts { length: Some(_), .. })) {
+            let fault = Fault::new(format!("the supply of [master], station {master}, would never return"))
+                .rule("cycles are those of [master], and without supply it begins none")
+                .help("at and for as times, such as at = \"1 s\", for = \"20 ms\"");
+            about(reader, &format!("disturbance.{}.for", i + 1), &[], fault);
+        }
+    }
+}
+
 /// Every station that a disturbance names is there.
 pub(in crate::study::scenario) fn are_there(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let all: Vec<_> = facts.scenario.stations().map(|station| station.address).collect();
     for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
+        if let What::Source(_) = disturbance.what {
+            continue; // It has a key of its own for that.
+        }
         let mut named = disturbance.what.stations().iter();
         if let Some(address) = named.find(|address| !all.contains(address)) {
             let mut known = all.clone();

@@ -1,0 +1,32 @@
+//! Sweeps: one scenario many times, with other parameters and other draws, on all cores.
+//!
+//! ```text
+//! sweep file -> Definition -> Plan ---------> jobs -> crew of workers -> Journal -> results.csv, summary.csv
+//!               axes, skips   combination:            one run after        a line
+//!               figures       refused, run            the other each       per run
+//! ```
+//!
+//! A run is told by its [key](key::RunKey) alone: what is in the [journal](journal) is never computed twice, whatever
+//! ended the sweep before and however its file has grown since. Tables are written from the journal in the order of the
+//! plan, so that they do not tell how many threads, calls or machines there were.
+
+pub mod axis;
+pub mod combination;
+pub mod command;
+pub mod crew;
+pub mod definition;
+pub mod journal;
+pub mod key;
+pub mod merge;
+mod page;
+pub mod parameter;
+mod picture;
+pub mod plan;
+mod results;
+pub mod shard;
+pub mod skip;
+pub mod store;
+mod summary;
+mod worker;
+
+pub use worker::is_at_work;

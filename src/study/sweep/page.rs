@@ -1,0 +1,200 @@
+//! Page: what the commands say on screen.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use super::command::{Call, Failed};
+use super::journal::Journal;
+use super::plan::{Base, Plan};
+use super::shard::Shard;
+
+/// What a cycle of a slave costs, figures included (ns). Measured on one core of a server of 2021; it is an estimate
+/// before the first run, and nothing depends on it.
+const NS_PER_SLAVE_CYCLE: u64 = 300;
+/// Most failed runs and refused combinations that a page names.
+const NAMED: usize = 10;
+
+/// Runs that are done.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Counts {
+    /// Before this call.
+    pub(super) before: usize,
+    /// In this call.
+    pub(super) done: usize,
+}
+
+/// What failed, and how to see it again.
+pub(super) struct Failures<'a> {
+    /// The scenario's file.
+    pub(super) base: &'a str,
+    pub(super) failed: &'a [Failed],
+}
+
+/// The plan of `isodp sweep --plan`.
+pub(super) fn plan(plan: &Plan, base: &Base, call: &Call, journal: Option<&Journal>) -> String {
+    let mut page =
+        format!("sweep {} of {}, model {}\n\n", plan.definition.name, base.source, env!("CARGO_PKG_VERSION"));
+    for axis in &plan.definition.axes {
+        let ends = [0, axis.len() - 1].map(|value| axis.label(value));
+        let keys =
+            if axis.keys == [axis.name.as_str()] { String::new() } else { format!(" ({})", axis.keys.join(", ")) };
+        let _ = writeln!(page, "axis {}{keys}: {} values, {} to {}", axis.name, axis.len(), ends[0], ends[1]);
+    }
+    page += &refused(plan);
+    let _ =
+        writeln!(page, "\n{:<32} {:<5} {:>5} {:>20} {:>12}  parameters", "run", "state", "rep", "seed", "slave-cycles");
+    let (mut runs, mut done, mut work) = (0_u64, 0_u64, 0_u64);
+    for job in plan.jobs_of(call.shard) {
+        let is_done = journal.is_some_and(|journal| journal.has(job.key));
+        let cost = plan.work[job.combination as usize];
+        (runs, done) = (runs + 1, done + u64::from(is_done));
+        work = work.saturating_add(if is_done { 0 } else { cost });
+        let state = if is_done { "done" } else { "to do" };
+        let parameters = parameters(plan, job.combination);
+        let _ =
+            writeln!(page, "{} {state:<5} {:>5} {:>20} {cost:>12}  {parameters}", job.key, job.repetition, job.seed);
+    }
+    let part = if call.shard.is_all() { String::new() } else { format!(" in part {}", call.shard) };
+    let seconds = work.saturating_mul(NS_PER_SLAVE_CYCLE) as f64 / 1e9;
+    let _ = writeln!(
+        page,
+        "\n{} combinations to run, {runs} runs{part}, {done} of them done\nto do: {work} slave-cycles, about {seconds:.1} s on one core at {NS_PER_SLAVE_CYCLE} ns each",
+        plan.combinations_to_run(),
+    );
+    page
+}
+
+/// The end of a sweep.
+pub(super) fn done(
+    plan: &Plan,
+    shard: Shard,
+    counts: Counts,
+    failures: &Failures<'_>,
+    dir: &Path,
+    files: &[String],
+) -> String {
+    let Counts { before, done } = counts;
+    let part = if shard.is_all() { String::new() } else { format!(", part {shard}") };
+    let mut page = format!(
+        "sweep {}{part}: {} combinations, {} runs\n{}{done} runs done now, {before} before, {} failed\n",
+        plan.definition.name,
+        plan.combinations_to_run(),
+        before + done,
+        refused(plan),
+        failures.failed.len()
+    );
+    page += &failures.text(plan);
+    match files {
+        [] => {
+            let _ = writeln!(page, "\nthis part is in {}; isodp merge OUT PART... joins all parts", dir.display());
+        }
+        files => page += &written(dir, files),
+    }
+    page
+}
+
+/// The end of a merge.
+pub(super) fn merged(
+    plan: &Plan,
+    parts: usize,
+    left: usize,
+    failures: &Failures<'_>,
+    dir: &Path,
+    files: &[String],
+) -> String {
+    let mut page = format!("sweep {}: {parts} parts joined, {} failed\n", plan.definition.name, failures.failed.len());
+    page += &failures.text(plan);
+    match files {
+        [] => {
+            let _ = writeln!(page, "\n{left} runs are in none of the parts; what there is is in {}", dir.display());
+        }
+        files => page += &written(dir, files),
+    }
+    page
+}
+
+/// A sweep that was stopped.
+pub(super) fn stopped(plan: &Plan, call: &Call, done: usize, left: usize) -> String {
+    format!(
+        "sweep {} stopped: {done} runs done, {left} left\nthe same call goes on where this one ended:\n  {}\n",
+        plan.definition.name,
+        again(call)
+    )
+}
+
+/// A sweep that was stopped before its first run.
+pub(super) fn stopped_early(call: &Call) -> String {
+    format!("stopped before the first run; the same call begins again:\n  {}\n", again(call))
+}
+
+/// The call once more.
+fn again(call: &Call) -> String {
+    let mut text =
+        format!("isodp sweep {} --out {}", shell(&call.file.to_string_lossy()), shell(&call.out.to_string_lossy()));
+    if !call.shard.is_all() {
+        let _ = write!(text, " --shard {}", call.shard);
+    }
+    text
+}
+
+fn written(dir: &Path, files: &[String]) -> String {
+    format!("\nfiles in {}: {}\n", dir.display(), files.join(", "))
+}
+
+/// Combinations that are not run.
+fn refused(plan: &Plan) -> String {
+    let mut text = String::new();
+    match plan.skipped() {
+        0 => {}
+        skipped => {
+            let _ = writeln!(text, "{skipped} combinations left out by conditions");
+        }
+    }
+    let refused = plan.refused().count();
+    if refused > 0 {
+        let _ = writeln!(text, "{refused} combinations refused:");
+    }
+    for (combination, why) in plan.refused().take(NAMED) {
+        let _ = writeln!(text, "  {}: {why}", parameters(plan, combination));
+    }
+    if refused > NAMED {
+        let _ = writeln!(text, "  and {} more, see plan.json", refused - NAMED);
+    }
+    text
+}
+
+impl Failures<'_> {
+    /// Each with the call that shows it again.
+    fn text(&self, plan: &Plan) -> String {
+        let mut text = String::new();
+        for Failed { job, failure } in self.failed.iter().take(NAMED) {
+            let reason = failure.reason.lines().next().unwrap_or_default();
+            let _ = write!(text, "  failed: {reason}\n    isodp replay {} --seed {}", shell(self.base), job.seed);
+            for (key, value) in plan.sets(job.combination) {
+                let _ = write!(text, " --run-set {}", shell(&format!("{key}={value}")));
+            }
+            let _ = writeln!(text, " --cycle {}", failure.cycle);
+        }
+        if self.failed.len() > NAMED {
+            let _ = writeln!(text, "  and {} more, see results.csv", self.failed.len() - NAMED);
+        }
+        text
+    }
+}
+
+/// Keys and values of a combination on one line.
+fn parameters(plan: &Plan, combination: u64) -> String {
+    let sets = plan.definition.combinations().sets(combination);
+    let words: Vec<_> = sets.iter().map(|(key, value)| shell(&format!("{key}={value}"))).collect();
+    if words.is_empty() { "-".to_owned() } else { words.join(" ") }
+}
+
+/// `word` as a shell takes it.
+fn shell(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-/=:,+%@#".contains(c);
+    if !word.is_empty() && !word.starts_with('#') && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
