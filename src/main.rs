@@ -11,7 +11,9 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isodp::sim::network::NetworkEvent;
 use isodp::sim::queue::NearQueue;
+use isodp::study::baseline::command as baseline;
 use isodp::study::budget::Budget;
+use isodp::study::compare::command as compare;
 use isodp::study::export::capture;
 use isodp::study::gsd::Gsd;
 use isodp::study::plan::command::{Call as PlanCall, answer};
@@ -26,7 +28,8 @@ use isodp::study::what_if::command as what_if;
 use isodp::study::{batch, devices, figure};
 use isodp::time::Span;
 
-/// An expectation of a run fails, a planned network breaks a rule, or a GSD file is inconsistent.
+/// An expectation of a run fails, a planned network breaks a rule, a figure moved beyond its tolerance, or a GSD file is
+/// inconsistent.
 const VIOLATED: u8 = 1;
 /// A wrong call, scenario or file.
 const USAGE: u8 = 2;
@@ -58,14 +61,27 @@ Examples:
   isodp run scenarios/reference.toml --set expect.latch_skew.p99='<= 400 ns'
       The same with another expectation; isodp figures lists what can be expected.
 
-Exit codes: 0 done and every expectation holds, 1 an expectation fails, a planned rule is violated or a GSD file is
-inconsistent, 2 wrong usage, scenario or file.";
+Exit codes: 0 done and every expectation holds, 1 an expectation fails, a planned rule is violated, a figure moved too
+far or a GSD file is inconsistent, 2 wrong usage, scenario or file.";
 
 const GSD_CODES: &str = "\
 Exit codes: 0 the file fits together (notes are no fault), 1 it is inconsistent: one of the findings is an error, 2 it cannot be read.";
 
 const SWEEP_CODES: &str = "\
 Exit codes: 0 all runs are done, 1 some failed or are missing, 2 wrong usage or file, 130 stopped by Ctrl-C; the same call goes on.";
+
+const REGRESSION: &str = "\
+Examples:
+  isodp baseline scenarios/reference.toml --tolerance '*.p99=2%' --tolerance 'slave.each.lock_time=5 ms'
+      Writes scenarios/reference.baseline.json.
+  isodp compare scenarios/reference.toml
+      What moved since then; the first difference by cycle, station and observation, with both values.
+  isodp compare scenarios/reference.toml --set slave.5.crystal='60 ppm'
+      The same with a changed value.
+  isodp compare b.toml --with a.toml
+      Two scenarios.
+
+Exit codes of compare: 0 nothing moved beyond its tolerance, 1 a figure did, 2 wrong usage, file, or baseline.";
 
 /// Simulates isochronous PROFIBUS DP (DP-V2) networks, telegram by telegram, in deterministic time.
 #[derive(Parser)]
@@ -95,6 +111,12 @@ enum Command {
     /// Joins the parts of a sweep that several machines ran with isodp sweep --shard.
     #[command(after_help = SWEEP_CODES)]
     Merge(MergeArgs),
+    /// Keeps what a scenario comes to, every figure and where to look for a difference, in a file to compare with later.
+    #[command(after_help = REGRESSION)]
+    Baseline(BaselineArgs),
+    /// Runs a scenario and tells which figures moved since its baseline was written, and where the two runs parted.
+    #[command(after_help = REGRESSION)]
+    Compare(CompareArgs),
     /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
     /// Lists the disturbances that a scenario can name, with their keys and an example of each, or tells about one.
@@ -199,8 +221,9 @@ struct ReplayArgs {
     /// Seed of all random streams, instead of the scenario's.
     #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
     seed: Option<u64>,
-    /// Writes flight.txt, flight.pcapng with its dissector and flight.vcd of these cycles too, to DIR/<scenario>/.
-    #[arg(long, value_name = "DIR", conflicts_with = "sets")]
+    /// Writes flight.txt, flight.pcapng with its dissector and flight.vcd of these cycles too, to DIR/<scenario>/; with
+    /// --set what_if.svg, a picture of both futures.
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// What if: from the cycle on another future runs beside the original, with this value of the scenario, for example
     /// slave.3.crystal='40 ppm'. May be given several times.
@@ -209,6 +232,47 @@ struct ReplayArgs {
     /// Changes a value for the whole run, as --set of isodp run does. May be given several times.
     #[arg(long = "run-set", value_name = "KEY=VALUE", value_parser = assignment)]
     run_sets: Vec<(String, String)>,
+}
+
+#[derive(Args)]
+struct BaselineArgs {
+    /// Scenario file (TOML).
+    #[arg(value_name = "FILE")]
+    scenario: PathBuf,
+    /// The baseline; without it <scenario>.baseline.json beside the scenario file. The tolerances of one that is there stay.
+    #[arg(long, value_name = "BASELINE")]
+    out: Option<PathBuf>,
+    /// By how much figures may move later: NAME=5%, NAME=100ns, NAME=3; in NAME, * stands for anything. Several times.
+    #[arg(long = "tolerance", value_name = "NAME=LIMIT", value_parser = assignment)]
+    tolerances: Vec<(String, String)>,
+    /// Seed of all random streams, instead of the scenario's.
+    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
+    seed: Option<u64>,
+    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    sets: Vec<(String, String)>,
+}
+
+#[derive(Args)]
+struct CompareArgs {
+    /// Scenario file (TOML); it runs with the seed and the changed values that its baseline was written with.
+    #[arg(value_name = "FILE")]
+    scenario: PathBuf,
+    /// The baseline, without it <scenario>.baseline.json beside the scenario file; or another scenario, FILE.toml.
+    #[arg(long, value_name = "BASELINE")]
+    with: Option<PathBuf>,
+    /// By how much figures may move: NAME=5%, NAME=100ns, NAME=3; in NAME, * stands for anything. Without, by nothing.
+    #[arg(long = "tolerance", value_name = "NAME=LIMIT", value_parser = assignment)]
+    tolerances: Vec<(String, String)>,
+    /// Shows every figure, not only those that moved.
+    #[arg(long)]
+    all: bool,
+    /// Seed of all random streams, instead of the baseline's.
+    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
+    seed: Option<u64>,
+    /// Changes a value of the scenario as well. May be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    sets: Vec<(String, String)>,
 }
 
 #[derive(Args)]
@@ -268,6 +332,8 @@ fn main() -> ExitCode {
         Command::Replay(args) => replay_command(args).map(done),
         Command::Sweep(args) => sweep_command(args),
         Command::Merge(args) => merge_command(&args),
+        Command::Baseline(args) => baseline_command(args).map(done),
+        Command::Compare(args) => compare_command(args),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
         Command::Disturbances(args) => disturbances_command(args.name.as_deref()).map(done),
         Command::Figures(args) => figures_command(args.scenario.as_deref()).map(done),
@@ -366,7 +432,7 @@ fn replay_command(args: ReplayArgs) -> Result<String, Box<dyn std::error::Error>
     let ReplayArgs { scenario: file, cycle, window, seed, out, sets, run_sets } = args;
     let run_sets = with_seed(run_sets, seed);
     if !sets.is_empty() {
-        return what_if::answer(&what_if::Call { file, run_sets, sets, cycle, window });
+        return what_if::answer(&what_if::Call { file, run_sets, sets, cycle, window, out });
     }
     let scenario = Scenario::load(&file, &run_sets)?;
     let around = Window::around(cycle, window.unwrap_or(0));
@@ -408,6 +474,18 @@ fn code(end: End) -> ExitCode {
         End::Failed => ExitCode::from(VIOLATED),
         End::Stopped => ExitCode::from(STOPPED),
     }
+}
+
+fn baseline_command(args: BaselineArgs) -> Result<String, Box<dyn std::error::Error>> {
+    let BaselineArgs { scenario: file, out, tolerances, seed, sets } = args;
+    baseline::answer(&baseline::Call { file, sets: with_seed(sets, seed), out, tolerances })
+}
+
+fn compare_command(args: CompareArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
+    let CompareArgs { scenario: file, with, tolerances, all, seed, sets } = args;
+    let answer = compare::answer(&compare::Call { file, with, sets: with_seed(sets, seed), tolerances, all })?;
+    let code = if answer.beyond { ExitCode::from(VIOLATED) } else { ExitCode::SUCCESS };
+    Ok((answer.page, code))
 }
 
 /// Overrides with that of the seed, where one is given.

@@ -3,6 +3,7 @@
 mod acyclic;
 mod budget;
 mod cli;
+mod compare;
 mod determinism;
 mod devices;
 mod disturbance_list;

@@ -10,6 +10,7 @@ use isodp::study::scenario::Scenario;
 use isodp::study::what_if::{Futures, WhatIfError, futures};
 use isodp::time::Span;
 
+use crate::cli::{Room, SCENE};
 use crate::support::{address, scenario, shipped};
 
 type Near = NearQueue<NetworkEvent>;
@@ -30,12 +31,13 @@ fn whole(name: &str) -> Scenario {
 fn part(name: &str, sets: &[Set<'_>], cycle: u64) -> Futures<Fingerprints> {
     let original = scenario(name, &[SHORT]);
     let altered = scenario(name, &[&[SHORT], sets].concat());
-    futures::<Near, _>([&original, &altered], (cycle, None), rider(&original)).unwrap_or_else(|error| panic!("{error}"))
+    futures::<Near, _>([&original, &altered], (cycle, None), rider(&original), |_| ())
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 fn refused(name: &str, sets: &[Set<'_>], cycle: u64) -> WhatIfError {
     let original = scenario(name, &[SHORT]);
     let altered = scenario(name, &[&[SHORT], sets].concat());
-    futures::<Near, _>([&original, &altered], (cycle, None), ()).expect_err("no future")
+    futures::<Near, _>([&original, &altered], (cycle, None), (), |()| ()).expect_err("no future")
 }
 
 /// Everything that a network is comes along into its copy: machines, queue, line, streams.
@@ -45,7 +47,7 @@ fn without_a_change_both_futures_are_the_straight_run() {
         let original = whole(&name);
         let straight = run::<Near>(&original, None, |_| ()).expect("a run without files");
         for cycle in [0, 57] {
-            let futures = futures::<Near, _>([&original, &original], (cycle, None), rider(&original));
+            let futures = futures::<Near, _>([&original, &original], (cycle, None), rider(&original), |_| ());
             let Futures { differences, ends, .. } = futures.unwrap_or_else(|error| panic!("{name}: {error}"));
             assert_eq!(differences.first(), None, "{name} from {cycle}");
             for (_, rider) in &ends {
@@ -60,9 +62,9 @@ fn without_a_change_both_futures_are_the_straight_run() {
 fn the_plain_queue_gives_the_same_futures() {
     let [original, altered] =
         [scenario("reference", &[SHORT]), scenario("reference", &[SHORT, ("slave.5.crystal", "40 ppm")])];
-    let near = futures::<Near, _>([&original, &altered], (300, None), rider(&original)).expect("futures");
-    let heap =
-        futures::<HeapQueue<NetworkEvent>, _>([&original, &altered], (300, None), rider(&original)).expect("futures");
+    let near = futures::<Near, _>([&original, &altered], (300, None), rider(&original), |_| ()).expect("futures");
+    let heap = futures::<HeapQueue<NetworkEvent>, _>([&original, &altered], (300, None), rider(&original), |_| ())
+        .expect("futures");
     assert_eq!(near.differences, heap.differences);
     for (near, heap) in near.ends.iter().zip(&heap.ends) {
         assert_eq!((near.0, near.1.total()), (heap.0, heap.1.total()));
@@ -136,8 +138,8 @@ fn the_original_is_the_straight_run_whatever_the_other_does() {
 fn a_window_ends_both() {
     let original = scenario("reference", &[SHORT]);
     let altered = scenario("reference", &[SHORT, ("slave.5.crystal", "-47 ppm")]);
-    let Futures { ends, from, .. } =
-        futures::<Near, _>([&original, &altered], (200, Some(10)), ()).unwrap_or_else(|error| panic!("{error}"));
+    let Futures { ends, from, .. } = futures::<Near, _>([&original, &altered], (200, Some(10)), (), |()| ())
+        .unwrap_or_else(|error| panic!("{error}"));
     for (end, ()) in ends {
         let cycles = (end - from).as_ms() / 2.0;
         assert!((9.5..10.5).contains(&cycles), "{cycles} cycles");
@@ -151,10 +153,95 @@ fn what_stations_keep_cannot_change() {
     }
 }
 #[test]
+fn a_disturbance_that_comes_later_can_be_another() {
+    let text = format!(
+        "{SCENE}\n[[disturbance]]\nkind = \"crystal-offset\"\nstation = 4\noffset = \"20 ppm\"\ncycle = 50\nfor = 20\n"
+    );
+    let scene = |sets: &[(&str, &str)]| {
+        let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
+        Scenario::parse("scene", "scene.toml", &text, &sets).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let original = scene(&[]);
+    let straight = run::<Near>(&original, None, |_| ()).expect("a run without files");
+    for (set, first) in [(("disturbance.1.offset", "30 ppm"), 50), (("slave.4.crystal", "1 ppm"), 40)] {
+        let both = futures::<Near, _>([&original, &scene(&[set])], (40, None), rider(&original), |_| ());
+        let Futures { differences, ends, .. } = both.unwrap_or_else(|error| panic!("{error}"));
+        let difference = differences.first().expect("a difference");
+        assert_eq!(difference.station, address(4), "{set:?}: {difference}");
+        assert!(difference.cycle() >= Some(first), "{set:?}: {difference}");
+        assert_eq!(ends[0].1.total(), straight.fingerprint, "{set:?}");
+    }
+}
+#[test]
 fn what_has_happened_cannot_change() {
     assert_eq!(refused("life-sign-loss", &[("event.1.cycle", "99")], 100), WhatIfError::Past { cycle: 100 });
 }
 #[test]
 fn a_cycle_that_never_comes_is_an_error() {
     assert!(matches!(refused("reference", &[], 1_000_000), WhatIfError::Replay(_)));
+}
+
+#[test]
+fn the_page_says_what_parts_and_the_picture_is_drawn() {
+    let room = Room::new();
+    let call = |set: &str| ["replay", "scene.toml", "--cycle", "40", "--set", set].map(str::to_owned).to_vec();
+    let run = |arguments: &[String]| {
+        let arguments: Vec<_> = arguments.iter().map(String::as_str).collect();
+        room.runs(&arguments)
+    };
+    let page = run(&[call("slave.4.crystal=49 ppm"), vec!["--out".into(), "pictures".into()]].concat());
+    for part in [
+        "scene, seed 3: from cycle 40 on, at 0.",
+        "first difference: cycle 4",
+        "  original  ",
+        "  altered   ",
+        "latch_skew",
+    ] {
+        assert!(page.contains(part), "{part}:\n{page}");
+    }
+    let picture = std::fs::read_to_string(room.path("pictures/scene/what_if.svg")).expect("a picture");
+    let picture = roxmltree::Document::parse(&picture).expect("XML");
+    let texts: Vec<_> = picture.descendants().filter_map(|node| node.text()).map(str::trim).collect();
+    for text in ["original", "altered", "they part, cycle 40", "latch skew [ns]", "PLL error [ns]"] {
+        assert!(texts.contains(&text), "{text}: {texts:?}");
+    }
+    let same = run(&call("slave.4.motion={ kind = \"standstill\" }"));
+    assert!(same.contains("no difference: ") && same.contains("none of "), "{same}");
+}
+
+#[test]
+fn a_whole_run_with_a_change_is_told_as_before() {
+    let room = Room::new();
+    let told = room.runs(&["replay", "scene.toml", "--cycle", "40", "--run-set", "slave.4.crystal=49 ppm"]);
+    assert!(told.starts_with("scene, seed 3, cycles 40 to 40"), "{told}");
+    room.write(
+        "faster.toml",
+        SCENE.replace("addresses = \"3..4\"", "address = 3").replace(
+            "[[link]]",
+            "[[slave]]\naddress = 4\ndevice = \"posital-ocd-dpb1b\"\ncrystal = \"49 ppm\"\n\n[[link]]",
+        ),
+    );
+    let faster = room.runs(&["replay", "faster.toml", "--cycle", "40"]);
+    assert_eq!(told.lines().skip(1).collect::<Vec<_>>(), faster.lines().skip(1).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_cannot_change_is_named() {
+    let room = Room::new();
+    let output = room.call(&[
+        "replay",
+        "scene.toml",
+        "--cycle",
+        "40",
+        "--set",
+        "slave.4.crystal=1 ppm",
+        "--set",
+        "master.t_o=1.5 ms",
+    ]);
+    let said = String::from_utf8(output.stderr).expect("text");
+    assert_eq!((output.status.code(), output.stdout.is_empty()), (Some(2), true));
+    assert!(
+        said.starts_with("error: --set \"master.t_o=1.5 ms\": this cannot change while the network runs\n  rule: "),
+        "{said}"
+    );
 }

@@ -27,7 +27,7 @@ const TAIL: u64 = 2_000;
 /// Lines of that.
 const LINES: usize = 12;
 /// How long a run of so many cycles waits for the next one. Model: far beyond every start-up and recovery.
-const PATIENCE: Span = Span::from_s(60);
+pub(super) const PATIENCE: Span = Span::from_s(60);
 
 /// How much may happen in a run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

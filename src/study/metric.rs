@@ -117,6 +117,10 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
     pub fn sink(&self) -> &S {
         &self.sink
     }
+    /// From now on the shafts turn as `shafts` says.
+    pub fn set_shafts(&mut self, shafts: V) {
+        self.shafts = shafts;
+    }
     /// The run is over at `end`: the rows of the cycle under way leave as far as they came. A cycle that only begins
     /// at the end belongs to the run no more.
     pub fn finish(mut self, end: Time) -> (Counts, S) {

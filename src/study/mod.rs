@@ -2,9 +2,11 @@
 //! threads and reports.
 
 pub mod acyclic;
+pub mod baseline;
 pub mod batch;
 pub mod budget;
 pub mod build;
+pub mod compare;
 pub mod count;
 pub mod devices;
 pub mod difference;

@@ -79,6 +79,7 @@ pub enum RunError {
 }
 
 /// Speeds of the shafts of a scenario.
+#[derive(Clone, Debug)]
 pub(super) struct Speeds(Vec<Option<(Shaft, f64)>>);
 
 impl Speeds {
@@ -287,7 +288,8 @@ fn masters(scenario: &Scenario) -> Vec<MasterLayout> {
     class1.chain(class2).collect()
 }
 
-fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
+/// What pictures say about a run of `scenario`.
+pub(super) fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
     PlotMeta {
         cycle: scenario.cycle_symbol(),
         scenario: scenario.name.clone(),

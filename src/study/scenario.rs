@@ -133,6 +133,16 @@ impl Scenario {
     pub fn load_to_plan(path: &Path, overrides: &[(String, String)]) -> Result<Self, ScenarioError> {
         Self::open(path, overrides, Check::ToPlan)
     }
+    /// As [`Self::load`], and the text of the file.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_text(path: &Path, overrides: &[(String, String)]) -> Result<(Self, String), ScenarioError> {
+        let (name, source, text) = Self::text_of(path)?;
+        let dir = path.parent().unwrap_or(Path::new(""));
+        let origin = Origin { dir, name: &name, source: &source };
+        Ok((Self::read(&origin, &text, overrides, Check::All)?, text))
+    }
     fn open(path: &Path, overrides: &[(String, String)], check: Check) -> Result<Self, ScenarioError> {
         let (name, source, text) = Self::text_of(path)?;
         let dir = path.parent().unwrap_or(Path::new(""));
@@ -234,6 +244,10 @@ impl Scenario {
 
 /// The octets of the file `path`, which is a `noun`; `in_directory` says what to name instead of a directory.
 pub(super) fn read_file(path: &Path, noun: &str, in_directory: &str) -> Result<Vec<u8>, Fault> {
+    read_file_of(path, noun, in_directory, Scenario::MAX_FILE)
+}
+/// The same with at most `most` octets.
+pub(super) fn read_file_of(path: &Path, noun: &str, in_directory: &str, most: u64) -> Result<Vec<u8>, Fault> {
     let unreadable = |error: std::io::Error| {
         Fault::new(match error.kind() {
             std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
@@ -246,17 +260,18 @@ pub(super) fn read_file(path: &Path, noun: &str, in_directory: &str) -> Result<V
         return Err(Fault::new("this is a directory").help(in_directory));
     }
     let too_long = |megabytes: u64| {
-        Fault::new(format!("a {megabytes} MB file is no {noun}")).rule(format!("a {noun} has at most 4 MB"))
+        Fault::new(format!("a {megabytes} MB file is no {noun}"))
+            .rule(format!("a {noun} has at most {} MB", most >> 20))
     };
-    if metadata.len() > Scenario::MAX_FILE {
+    if metadata.len() > most {
         return Err(too_long(metadata.len().div_ceil(1_000_000)));
     }
     // A device or a pipe has no length: no more is read than a scenario may have.
     let mut octets = Vec::new();
     let file = File::open(path).map_err(unreadable)?;
-    file.take(Scenario::MAX_FILE + 1).read_to_end(&mut octets).map_err(unreadable)?;
-    if octets.len() as u64 > Scenario::MAX_FILE {
-        return Err(too_long(5));
+    file.take(most + 1).read_to_end(&mut octets).map_err(unreadable)?;
+    if octets.len() as u64 > most {
+        return Err(too_long((most >> 20) + 1));
     }
     Ok(octets)
 }

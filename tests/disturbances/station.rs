@@ -216,7 +216,7 @@ fn a_station_that_is_not_there_is_refused() {
 fn futures(original: &str, altered: &str, cycle: u64) -> [Fingerprint; 2] {
     let [original, altered] = [scene(original), scene(altered)];
     let rider = Fingerprints::new(address(2));
-    let futures = what_if::futures::<NearQueue<NetworkEvent>, _>([&original, &altered], (cycle, None), rider);
+    let futures = what_if::futures::<NearQueue<NetworkEvent>, _>([&original, &altered], (cycle, None), rider, |_| ());
     futures.expect("another future").ends.map(|(_, prints)| prints.total())
 }
 

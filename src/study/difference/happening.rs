@@ -5,7 +5,7 @@ use std::mem::discriminant;
 
 use crate::observation::Observation;
 use crate::sim::record::{Stamp, Transmission};
-use crate::time::{Local, Time};
+use crate::time::{Local, Span, Time};
 use crate::wire::words::Words;
 use crate::wire::{Sap, Telegram};
 
@@ -26,8 +26,13 @@ pub struct Happening {
 /// What a station did or saw.
 #[derive(Clone, PartialEq, Debug)]
 pub enum What {
-    /// It sent these octets.
-    Telegram(Vec<u8>),
+    /// It sent a telegram.
+    Telegram {
+        /// Its octets.
+        octets: Vec<u8>,
+        /// From the first bit to the last, in true time: a crystal shows here first.
+        length: Span,
+    },
     /// It observed this. Instants that it reads from its own crystal are turned into true ones, since two crystals that
     /// show different times are no difference.
     Observation(Observation),
@@ -38,8 +43,9 @@ pub enum What {
 impl Happening {
     /// A telegram in `cycle`.
     pub fn of_telegram(cycle: Option<u64>, telegram: &Transmission<'_>) -> Self {
+        let what = What::Telegram { octets: telegram.octets.to_vec(), length: telegram.end - telegram.start };
         let begun = if is_synch(telegram.octets) { Some(cycle.map_or(0, |cycle| cycle + 1)) } else { cycle };
-        Self { cycle: begun, at: telegram.start, what: What::Telegram(telegram.octets.to_vec()) }
+        Self { cycle: begun, at: telegram.start, what }
     }
     /// An observation in `cycle`.
     pub fn of_observation(cycle: Option<u64>, stamp: &Stamp<'_>, what: &Observation) -> Self {
@@ -54,7 +60,11 @@ impl Happening {
     }
     /// Whether this is a SYNCH.
     pub fn is_synch(&self) -> bool {
-        matches!(&self.what, What::Telegram(octets) if is_synch(octets))
+        match &self.what {
+            What::Telegram { octets, .. } => is_synch(octets),
+            What::Observation(_) => false,
+            What::Told(text) => text.starts_with("to 127: SYNCH "),
+        }
     }
     /// Whether both are the same at the same instant.
     pub fn agrees_with(&self, other: &Self) -> bool {
@@ -66,7 +76,7 @@ impl What {
     /// Whether both are of one kind: two telegrams, the same observation with other values, the same text.
     pub fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Telegram(_), Self::Telegram(_)) => true,
+            (Self::Telegram { .. }, Self::Telegram { .. }) => true,
             (Self::Observation(one), Self::Observation(other)) => discriminant(one) == discriminant(other),
             (Self::Told(one), Self::Told(other)) => one == other,
             _ => false,
@@ -85,7 +95,7 @@ pub(in crate::study) fn is_synch(octets: &[u8]) -> bool {
 impl fmt::Display for What {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Telegram(octets) => {
+            Self::Telegram { octets, length } => {
                 match Telegram::parse(octets) {
                     Ok(Telegram::Data { header, .. }) => write!(f, "to {}: ", header.da)?,
                     Ok(Telegram::Token { da, .. }) => write!(f, "to {da}: ")?,
@@ -96,7 +106,8 @@ impl fmt::Display for What {
                     Err(error) => write!(f, "unreadable: {error}")?,
                 }
                 f.write_str(" |")?;
-                octets.iter().try_for_each(|octet| write!(f, " {octet:02X}"))
+                octets.iter().try_for_each(|octet| write!(f, " {octet:02X}"))?;
+                write!(f, " [{} ticks]", length.ticks())
             }
             Self::Observation(what) => {
                 what.fmt(f)?;

@@ -8,7 +8,7 @@ mod happening;
 mod race;
 mod tape;
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 
 pub(in crate::study) use happening::is_synch;
 pub use happening::{Happening, What};
@@ -26,9 +26,9 @@ use crate::wire::Address;
 pub struct Difference {
     /// Whose.
     pub station: Address,
-    /// In the run that the other one is compared with; none if nothing corresponds there.
+    /// In the run that the other one is compared with, what it does there or next; none if it does nothing any more.
     pub before: Option<Happening>,
-    /// In the other run; none if nothing corresponds there.
+    /// The same in the other run.
     pub now: Option<Happening>,
 }
 
@@ -75,14 +75,15 @@ impl Difference {
             Some(cycle) => format!("cycle {cycle}, station {}", self.station),
             None => format!("before cycle 0, station {}", self.station),
         };
-        match self.later() {
-            Some(later) if later > Span::ZERO => text += &format!(", {later} later"),
-            Some(later) if later < Span::ZERO => text += &format!(", {} earlier", -later),
-            _ => {}
-        }
+        // Writing into a text cannot fail.
+        let _ = match self.later() {
+            Some(later) if later > Span::ZERO => write!(text, ", {later} later"),
+            Some(later) if later < Span::ZERO => write!(text, ", {} earlier", -later),
+            _ => Ok(()),
+        };
         let width = names.map(str::len).into_iter().max().unwrap_or(0);
         for (name, value) in names.iter().zip(self.values()) {
-            text += &format!("\n  {name:<width$}  {value}");
+            let _ = write!(text, "\n  {name:<width$}  {value}");
         }
         text
     }

@@ -11,6 +11,7 @@ use crate::sim::network::{Network, NetworkEvent, Until};
 use crate::sim::queue::Queue;
 use crate::sim::record::Recorder;
 use crate::study::build;
+use crate::study::event_budget::PATIENCE;
 use crate::study::run::until;
 use crate::study::scenario::Scenario;
 use crate::time::{Span, Time};
@@ -58,13 +59,16 @@ struct Side<Q, R> {
     network: Network<Node, Q>,
     end: End,
     recorder: (Tape, R),
+    /// Cycles begun, and the instant of this many.
+    headway: (u64, Time),
     over: bool,
 }
 
 impl<Q: Queue<NetworkEvent>, R: Recorder> Side<Q, R> {
     fn new(runner: Runner<Q, R>) -> Self {
         let Runner { network, master, cycle, end, rider } = runner;
-        Self { network, end, recorder: (Tape::new(master, cycle, end.cycle), rider), over: false }
+        let headway = (network.cycles(), network.now());
+        Self { network, end, recorder: (Tape::new(master, cycle, end.cycle), rider), headway, over: false }
     }
     /// Runs to `to`, or to the end if that is earlier. Tells how far it came.
     fn advance(&mut self, to: Time) -> Time {
@@ -75,8 +79,13 @@ impl<Q: Queue<NetworkEvent>, R: Recorder> Side<Q, R> {
                 break;
             }
         }
-        self.over |= self.end.at == Some(to);
-        self.recorder.0.ended().unwrap_or(to)
+        if self.network.cycles() > self.headway.0 {
+            self.headway = (self.network.cycles(), to);
+        }
+        // A run of so many cycles in which no cycle comes any more has no end.
+        self.over |= self.end.at == Some(to) || self.end.at.is_none() && to - self.headway.1 > PATIENCE;
+        // What else comes at the instant at which a run ends, it does not have.
+        self.recorder.0.ended().map_or(to, |ended| ended - Span::from_ticks(1))
     }
 }
 
@@ -145,9 +154,16 @@ impl<Q: Queue<NetworkEvent>, R: Recorder> Race<Q, R> {
                 if found.is_none() {
                     *found = first([before, now], address, strand, passed);
                 }
-                if found.is_some() {
-                    before.finish(station, strand);
-                    now.finish(station, strand);
+                // A side that had nothing to show tells what it does next, if it does anything.
+                if let Some(found) = found {
+                    for (side, tape) in [(&mut found.before, &mut *before), (&mut found.now, &mut *now)] {
+                        if side.is_none() {
+                            *side = tape.pop(station, strand);
+                        }
+                        if side.is_some() {
+                            tape.finish(station, strand);
+                        }
+                    }
                 }
             }
         }
@@ -159,7 +175,6 @@ fn first([before, now]: [&mut Tape; 2], address: Address, strand: Strand, passed
     let station = usize::from(address.get());
     loop {
         let different = match (before.first(station, strand), now.first(station, strand)) {
-            (None, None) => return None,
             (Some(one), Some(other)) if one.agrees_with(other) => false,
             (Some(_), Some(_)) => true,
             (Some(alone), None) | (None, Some(alone)) if alone.at <= passed => true,

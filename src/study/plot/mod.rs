@@ -15,6 +15,7 @@ mod bus_cycle;
 mod chart;
 mod distribution;
 mod disturbances;
+pub mod futures;
 mod lanes;
 mod latch_skew;
 mod look;

@@ -16,11 +16,20 @@ use crate::study::scenario::Scenario;
 use crate::time::Time;
 use crate::wire::Address;
 
+/// What became of a SYNCH that the master sent.
+#[derive(Clone, Copy)]
+enum Sent {
+    /// Its first bit leaves then.
+    At(Time),
+    /// The scenario took it away.
+    TakenAway,
+}
+
 /// Looks for the master's last deed before a cycle.
 struct Scout {
     master: Address,
-    /// The SYNCH that was just sent: its first bit, none if it was taken away.
-    sent: Option<Option<Time>>,
+    /// The SYNCH that was just sent.
+    sent: Option<Sent>,
     /// When the cycle began.
     begun: Option<Time>,
 }
@@ -28,14 +37,14 @@ struct Scout {
 impl Recorder for Scout {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
         if telegram.sender == self.master && is_synch(telegram.octets) {
-            self.sent = Some(Some(telegram.start));
+            self.sent = Some(Sent::At(telegram.start));
         }
     }
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         match what {
             _ if stamp.station != self.master => {}
             // A SYNCH that the scenario takes away is never a telegram.
-            Observation::Disturbed { how: Disturbance::Lost, .. } => self.sent = Some(None),
+            Observation::Disturbed { how: Disturbance::Lost, .. } => self.sent = Some(Sent::TakenAway),
             Observation::CycleStart { .. } => self.begun = Some(stamp.at),
             _ => {}
         }
@@ -79,15 +88,19 @@ pub(super) fn fork<Q: Queue<NetworkEvent> + Clone, R: Recorder>(
         if over(&probe) || probe.run(Until::Time(at), 1, &mut scout) {
             return Err(too_late(&probe));
         }
-        if let Some(start) = scout.sent.take() {
-            last = Some((events, start));
+        if let Some(sent) = scout.sent.take() {
+            last = Some((events, sent));
         }
         if let Some(t0) = scout.begun {
             break t0;
         }
         events += 1;
     };
-    let (before, start) = last.unwrap_or((events, None));
+    let (before, sent) = last.unwrap_or((events, Sent::TakenAway));
     network.run(Until::Time(at), before, recorder);
-    Ok(Fork { network, begin: start.unwrap_or(t0) })
+    let begin = match sent {
+        Sent::At(start) => start,
+        Sent::TakenAway => t0,
+    };
+    Ok(Fork { network, begin })
 }

@@ -5,6 +5,7 @@
 
 pub mod command;
 mod fork;
+mod rider;
 mod world;
 
 use super::difference::{Differences, End, Race, Runner};
@@ -53,7 +54,7 @@ pub struct Futures<R> {
 }
 
 /// Runs `original` with `rider` until `cycle` begins, and from there on beside `altered`; for `window` cycles, or to
-/// the end of the run.
+/// the end of the run. `alter` is told of the rider of the other future before it goes on.
 ///
 /// # Errors
 /// The run has no such cycle, or a network that runs cannot become `altered`.
@@ -64,6 +65,7 @@ pub fn futures<Q: Queue<NetworkEvent> + Clone, R: Recorder + Clone>(
     [original, altered]: [&Scenario; 2],
     (cycle, window): (u64, Option<u64>),
     mut rider: R,
+    alter: impl FnOnce(&mut R),
 ) -> Result<Futures<R>, WhatIfError> {
     if !world::can_change(original, altered) {
         return Err(WhatIfError::Station { keys: String::new() });
@@ -81,7 +83,9 @@ pub fn futures<Q: Queue<NetworkEvent> + Clone, R: Recorder + Clone>(
     }
     let before = cycle.checked_sub(1);
     let runner = |network, rider| Runner { network, master: original.master.address, cycle: before, end, rider };
-    let runners = [runner(fork.network, rider.clone()), runner(other, rider)];
+    let mut beside = rider.clone();
+    alter(&mut beside);
+    let runners = [runner(fork.network, rider), runner(other, beside)];
     let mut race = Race::of(runners, original.master.t_dp);
     race.advance(from - Span::from_ticks(1));
     world::change_rest(race.begin(cycle), [original, altered], cycle);

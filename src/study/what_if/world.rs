@@ -40,8 +40,9 @@ fn in_the_old_world(original: &Scenario, altered: &Scenario) -> Scenario {
     }
     other.disturbances.clone_from(&original.disturbances);
     other.events.clone_from(&original.events);
-    // What is kept of a run is no part of the network.
+    // What is kept and expected of a run is no part of the network.
     other.record.clone_from(&original.record);
+    other.expectations.clone_from(&original.expectations);
     other
 }
 
