@@ -15,6 +15,7 @@ duration = "1200 ms"
 
 [bus]
 rate = "12 Mbit/s"
+cable = "100 m"
 hsa = 15
 t_tr = "21000 tbit"
 
@@ -88,12 +89,27 @@ fn one_disturbance_is_told_alone() {
     assert_eq!(errors, "error: there is no disturbance \"lost-telegram\"; did you mean \"lost-telegrams\"?\n");
 }
 
+/// The same network in two halls with a repeater between them, its masters in the first one.
+fn in_halls(disturbance: &str) -> Scenario {
+    let halls = "hsa = 15\nt_tr = \"21000 tbit\"\n[[segment]]\nname = \"hall 1\"\ncable = \"50 m\"\n\
+                 [[segment]]\nname = \"hall 2\"\ncable = \"50 m\"\n\
+                 [[repeater]]\nfrom = \"hall 1\"\nto = \"hall 2\"\n";
+    let text = NETWORK.replace("cable = \"100 m\"\nhsa = 15\nt_tr = \"21000 tbit\"\n", halls);
+    let text = text.replace("address = 2\n", "address = 2\nsegment = \"hall 1\"\n");
+    let text = text.replace("address = 5\n", "address = 5\nsegment = \"hall 1\"\n");
+    let text = format!("{disturbance}\n{}", text.replace("\ndevice =", "\nsegment = \"hall 2\"\ndevice ="));
+    Scenario::parse("example", "example.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
 #[test]
 fn every_example_runs_and_does_something() {
-    let clean = Run::of(&parse(""));
+    let clean = [parse, in_halls].map(|network| Run::of(&network("")).fingerprint);
     for kind in DISTURBANCES {
-        let run = Run::of(&parse(&format!("disturbance = [{{ {} }}]", kind.example)));
-        assert_ne!(run.fingerprint, clean.fingerprint, "{}", kind.name);
+        let example = format!("disturbance = [{{ {} }}]", kind.example);
+        let needs_halls = kind.keys.iter().any(|key| key.name == "repeater");
+        let network = if needs_halls { in_halls } else { parse };
+        let run = Run::of(&network(&example));
+        assert_ne!(run.fingerprint, clean[usize::from(needs_halls)], "{}", kind.name);
     }
 }
 

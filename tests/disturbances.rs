@@ -3,7 +3,11 @@
 
 mod clock;
 mod gc_jitter;
+mod path;
+mod scenarios;
 mod station;
+
+pub(crate) use scenarios::TESTS;
 
 use isodp::observation::{Disturbance, Observation};
 use isodp::sim::fingerprint::Fingerprint;

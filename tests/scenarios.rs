@@ -62,6 +62,7 @@ fn every_shipped_scenario_has_a_test_and_says_what_it_asks() {
         crate::gsd::TESTS,
         crate::acyclic::TESTS,
         crate::line::TESTS,
+        crate::disturbances::TESTS,
         crate::verdicts::TESTS,
     ];
     let tested = || tables.into_iter().flatten();

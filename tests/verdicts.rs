@@ -241,7 +241,7 @@ fn other_programs_read_the_verdicts() {
     let lines: Vec<_> = failure.text().expect("a text").lines().collect();
     assert_eq!(lines[..3], ["slave.4.faults is 0, expected == 3", "margin -3", "<none> & no more"]);
     let replay = lines[3].strip_prefix("isodp ").expect("a call").split(' ').collect::<Vec<_>>();
-    assert_eq!(replay[..4], ["replay", "scene.toml", "--set", "run.seed=9"]);
+    assert_eq!(replay[..4], ["replay", "scene.toml", "--run-set", "run.seed=9"]);
     assert!(room.runs(&replay).contains("cycle "), "it can be called");
 }
 

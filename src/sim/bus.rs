@@ -4,6 +4,7 @@
 //! telegram draws once from that link's stream, however many listen: whoever is behind the link hears the same.
 
 use crate::fdl::Route;
+use crate::sim::cut::Cuts;
 use crate::sim::noise::LinkJitter;
 use crate::sim::record::Origin;
 use crate::sim::topology::Delays;
@@ -76,6 +77,7 @@ pub struct Bus {
     sent: u64,
     /// The telegrams sent last, each at the place of its number.
     recent: Vec<Sent>,
+    cuts: Cuts,
     /// From here on nothing is on the line, and a telegram may begin.
     clear_from: Time,
     /// T_SYN.
@@ -92,9 +94,50 @@ impl Bus {
             free: Vec::new(),
             sent: 0,
             recent: Vec::new(),
+            cuts: Cuts::none(),
             clear_from: Time::ZERO,
             t_syn: Span::ZERO,
         }
+    }
+    /// The same whose cables may be cut.
+    #[must_use]
+    pub fn with_cuts(self, cuts: Cuts) -> Self {
+        Self { cuts, ..self }
+    }
+    /// Telegrams kept. Where the line can be in parts, each part needs room for a long telegram beside the short ones of
+    /// the others: 255 characters last as long as 50 tokens with their pauses.
+    const fn kept(&self) -> usize {
+        if self.cuts.is_empty() { RECENT } else { RECENT * 8 }
+    }
+    /// The cable is cut at the place called `name` from now on, or whole again.
+    pub fn cut(&mut self, name: &str, open: bool, now: Time) {
+        let before = self.cuts.open();
+        self.cuts.set(name, open, now);
+        if open {
+            return;
+        }
+        // What is on the line in both parts meets.
+        let Self { flights, recent, cuts, .. } = self;
+        for flight in flights.iter_mut().filter(|flight| flight.listeners > 0 && !flight.frame.is_empty()) {
+            let meets = |sent: &Sent| {
+                let (a, b) = (flight.sender, sent.sender);
+                let both = (flight.start.max(sent.start).max(now), flight.end.min(sent.end));
+                cuts.part_by(before, a, b) && !cuts.part(a, b) && both.0 < both.1
+            };
+            flight.mark.broken |= recent.iter().any(meets);
+        }
+    }
+    /// Whether a telegram that ends at `listener` now has come there whole.
+    #[inline]
+    pub fn reaches(&self, id: FlightId, listener: usize) -> bool {
+        self.cuts.is_empty() || {
+            let flight = self.flight(id);
+            !self.cuts.tear(flight.sender, listener, flight.start)
+        }
+    }
+    /// What the disturbance called `name` adds to the jitter of links counts from now on, or no more.
+    pub fn disturb_link(&mut self, name: &str, on: bool) {
+        self.jitter.iter_mut().for_each(|jitter| jitter.disturb(name, on));
     }
     /// The delays between the stations.
     pub const fn delays(&self) -> &Delays {
@@ -142,28 +185,34 @@ impl Bus {
     /// apart spoils the idle time before a request too. Returns the sender of one that overlaps, the one that ends last.
     #[cold]
     fn collide(&mut self, id: FlightId) -> Option<usize> {
-        let t_syn = self.t_syn;
-        let Flight { start, end, mark, ref frame, .. } = self.flights[usize::from(id.0)];
+        let Flight { start, end, sender, mark, ref frame, .. } = self.flights[usize::from(id.0)];
         let needs_idle = begins_with_idle(frame.octets());
-        let overlaps = |(from, to): (Time, Time)| from < to && start < to && from < end;
+        let Self { flights, recent, cuts, t_syn, .. } = self;
+        let t_syn = *t_syn;
+        let overlaps =
+            |(from, to): (Time, Time), other: usize| from < to && start < to && from < end && !cuts.part(sender, other);
         // What listeners wait for, however long ago it was sent.
-        for other in self.flights.iter_mut().filter(|other| other.listeners > 0 && !other.frame.is_empty()) {
+        for other in flights.iter_mut().filter(|other| other.listeners > 0 && !other.frame.is_empty()) {
             let spoilt = mark.apart && begins_with_idle(other.frame.octets());
             let end = if spoilt { end + t_syn } else { end };
-            other.mark.broken |= start < other.end && other.start < end;
+            other.mark.broken |= start < other.end && other.start < end && !cuts.part(sender, other.sender);
         }
         // One that was cut off before it began is as long as nothing.
-        let others = self.recent.iter().filter(|sent| overlaps((sent.start, sent.end)));
+        let others = recent.iter().filter(|sent| overlaps((sent.start, sent.end), sent.sender));
         let hit = others.max_by_key(|sent| sent.end).map(|sent| sent.sender);
-        let spoils = |sent: &Sent| sent.apart && needs_idle && start >= sent.end && start < sent.end + t_syn;
-        let broken = hit.is_some() || self.recent.iter().any(spoils);
-        self.flights[usize::from(id.0)].mark.broken |= broken;
+        let spoils = |sent: &Sent| {
+            let too_soon = start >= sent.end && start < sent.end + t_syn;
+            sent.apart && needs_idle && too_soon && !cuts.part(sender, sent.sender)
+        };
+        let broken = hit.is_some() || recent.iter().any(spoils);
+        flights[usize::from(id.0)].mark.broken |= broken;
         hit
     }
     /// Keeps the telegram for [`Self::is_busy`] instead of the oldest kept.
     fn remember(&mut self, id: FlightId) {
+        let kept = self.kept();
         let &Flight { start, end, sender, ref strays, mark: Mark { apart, .. }, .. } = &self.flights[usize::from(id.0)];
-        match self.recent.get_mut(self.sent as usize % RECENT) {
+        match self.recent.get_mut(self.sent as usize % kept) {
             Some(kept) => {
                 (kept.start, kept.end, kept.sender, kept.apart) = (start, end, sender, apart);
                 if !strays.is_empty() {
@@ -225,7 +274,7 @@ impl Bus {
     }
     /// Whether the station `listener` sees characters at `now`.
     pub fn is_busy(&self, now: Time, listener: usize) -> bool {
-        self.recent.iter().any(|sent| {
+        self.recent.iter().filter(|sent| !self.cuts.part(sent.sender, listener)).any(|sent| {
             let delay = self.delays.of(sent.sender, listener, &sent.strays);
             sent.start + delay <= now && now < sent.end + delay
         })

@@ -5,6 +5,7 @@
 
 pub mod clock;
 pub mod damage;
+pub mod instant;
 pub mod line;
 pub mod manner;
 pub mod order;
@@ -15,6 +16,7 @@ pub mod which;
 pub mod window;
 
 use crate::sim::fault::clock::{CrystalFault, Pull};
+use crate::sim::fault::instant::{InstantFault, Straying};
 use crate::sim::fault::line::{Line, LineFault};
 use crate::sim::fault::order::OrderFault;
 use crate::sim::fault::source::{Source, SourceFault};
@@ -23,6 +25,7 @@ use crate::sim::fault::turn::Turns;
 use crate::sim::fault::window::Window;
 use crate::sim::jitter::{GcJitter, JitterSource};
 use crate::sim::noise::{Purpose, Stream};
+use crate::sim::topology::Place;
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -48,6 +51,12 @@ pub enum What {
     Station(Vec<Address>, StationFault),
     /// It changes the rate of crystals.
     Crystal(Vec<Address>, CrystalFault),
+    /// It moves instants of these stations.
+    Instant(Vec<Address>, InstantFault),
+    /// It adds jitter of this half width to the link of this index.
+    Repeater(usize, Span),
+    /// It cuts the cable at this place.
+    Cut(Place),
     /// It makes the SYNCH of the isochronous master stray; whether its strays add up, too (Model: D1).
     Clock(GcJitter, bool),
     /// It orders something of the masters of these slaves.
@@ -58,9 +67,11 @@ impl What {
     /// The stations that it means, where it names them.
     pub fn stations(&self) -> &[Address] {
         match self {
-            Self::Line(_) | Self::Clock(..) => &[],
-            Self::Source(source) => source.near.as_slice(),
-            Self::Station(stations, _) | Self::Crystal(stations, _) | Self::Order(stations, _) => stations,
+            Self::Line(_) | Self::Clock(..) | Self::Source(_) | Self::Repeater(..) | Self::Cut(_) => &[],
+            Self::Station(stations, _)
+            | Self::Crystal(stations, _)
+            | Self::Instant(stations, _)
+            | Self::Order(stations, _) => stations,
         }
     }
 }
@@ -87,6 +98,8 @@ pub struct Faults {
     apart: Vec<Apart>,
     /// Jitter of SYNCH, each with the number of its disturbance.
     clocks: Vec<(u16, JitterSource)>,
+    receivers: Vec<Straying>,
+    answers: Vec<Straying>,
     /// All of them, as the scenario has them.
     all: Vec<Disturbance>,
     turning: Vec<Turning>,
@@ -109,7 +122,14 @@ impl Faults {
                     let source = JitterSource::of_disturbance(jitter.clone(), *window, *accumulates, stream);
                     faults.clocks.push((number, source.expect("a checked jitter")));
                 }
-                What::Source(_) | What::Crystal(..) | What::Order(..) => {}
+                What::Instant(stations, fault) => {
+                    let straying = Straying::new((number, name, *window), stations, *fault, seed);
+                    match fault {
+                        InstantFault::Receiver { .. } => faults.receivers.push(straying),
+                        InstantFault::Answer { .. } => faults.answers.push(straying),
+                    }
+                }
+                What::Source(_) | What::Crystal(..) | What::Order(..) | What::Repeater(..) | What::Cut(_) => {}
             }
             if matches!(what, What::Line(_)) {
                 continue;
@@ -136,7 +156,8 @@ impl Faults {
     }
     /// Takes over what `before` had drawn for disturbances that are in both.
     pub(super) fn go_on_from(&mut self, before: &Self) {
-        let same = |number: u16| before.all.iter().position(|other| *other == self.all[usize::from(number)]);
+        let all = &self.all;
+        let same = |number: u16| before.all.iter().position(|other| *other == all[usize::from(number)]);
         self.line.go_on_from(&before.line, same);
         for (number, source) in &mut self.clocks {
             let old = same(*number).and_then(|old| before.clocks.iter().find(|(other, _)| usize::from(*other) == old));
@@ -144,6 +165,29 @@ impl Faults {
                 source.clone_from(old);
             }
         }
+        let strayings = [(&mut self.receivers, &before.receivers), (&mut self.answers, &before.answers)];
+        for (new, old) in strayings {
+            for straying in new {
+                let old = same(straying.number).and_then(|n| old.iter().find(|other| usize::from(other.number) == n));
+                if let Some(old) = old {
+                    straying.go_on_from(old);
+                }
+            }
+        }
+    }
+    /// Whether ends of telegrams reach stations early or late.
+    pub const fn strays_arrivals(&self) -> bool {
+        !self.receivers.is_empty()
+    }
+    /// How much later than it comes `listener` captures a telegram's end. Signed.
+    #[cold]
+    pub fn capture_stray(&mut self, listener: Address, running: (Time, u64)) -> Span {
+        self.receivers.iter_mut().fold(Span::ZERO, |sum, straying| sum + straying.draw(listener, running))
+    }
+    /// How much later than usual `sender` answers.
+    #[inline]
+    pub fn answer_delay(&mut self, sender: Address, running: (Time, u64)) -> Span {
+        self.answers.iter_mut().fold(Span::ZERO, |sum, straying| sum + straying.draw(sender, running))
     }
     /// How much later than nominal disturbances make the SYNCH leave that should leave at `at` and begins the cycle of
     /// this number. Signed.

@@ -5,6 +5,7 @@
 
 pub mod bus;
 pub mod crystal;
+pub mod cut;
 pub mod fault;
 pub mod fingerprint;
 pub mod jitter;

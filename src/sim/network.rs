@@ -14,6 +14,7 @@ use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
 use crate::observation::Observation;
 use crate::sim::bus::{Bus, Flight, FlightId, Mark};
 use crate::sim::crystal::Crystal;
+use crate::sim::cut::Cuts;
 use crate::sim::fault::Faults;
 use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{Resolution, Shaft};
@@ -50,17 +51,20 @@ pub struct Wiring {
     pub tree: Tree,
     /// The links with jitter, by index, and what each draws.
     pub jitter: Vec<(usize, LinkJitter)>,
+    /// Where cables may be cut, each place with the name of the disturbance that does it.
+    pub cuts: Vec<(String, Place)>,
 }
 
 impl Wiring {
     /// One segment of cable.
     pub fn line() -> Self {
-        Self { tree: Tree::line(), jitter: Vec::new() }
+        Self { tree: Tree::line(), jitter: Vec::new(), cuts: Vec::new() }
     }
     /// The bus of stations at `places`.
     fn bus(self, places: &[Place]) -> Bus {
         let (unsteady, jitter): (Vec<_>, Vec<_>) = self.jitter.into_iter().unzip();
-        Bus::new(Delays::new(&self.tree, places, &unsteady), jitter)
+        let cuts = Cuts::new(self.cuts, &self.tree, places);
+        Bus::new(Delays::new(&self.tree, places, &unsteady), jitter).with_cuts(cuts)
     }
 }
 
@@ -386,7 +390,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let sample = if station.sample_with_telegrams { self.raw(slot) } else { 0 };
         let now = self.local(slot);
         // Without octets it was cut off before it began.
-        if station.powered && !self.bus.flight(id).frame.is_empty() && !self.is_deaf(slot) {
+        if station.powered && !self.bus.flight(id).frame.is_empty() && self.hears(slot, id) {
             self.out.clear();
             let flight = self.bus.flight(id);
             let octets = if flight.mark.broken { &[] } else { flight.frame.octets() };
@@ -397,6 +401,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         } else {
             self.bus.heard(id);
         }
+    }
+    /// Whether a telegram comes to a station's ears.
+    fn hears(&self, slot: usize, id: FlightId) -> bool {
+        self.bus.reaches(id, slot) && !self.is_deaf(slot)
     }
     /// Whether a disturbance keeps a station from hearing.
     fn is_deaf(&self, slot: usize) -> bool {
@@ -524,6 +532,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let jitter = jitter.max(self.now - start);
             start += jitter;
             end += jitter;
+        } else {
+            let delay = self.faults.answer_delay(address, (start, self.clocks_begun(false)));
+            start += delay;
+            end += delay;
         }
         if send.clock {
             // The master's transmitter runs, whatever becomes of the telegram.
@@ -582,7 +594,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// A request for all passes every filter. Only the nearest neighbour is told now and tells the next one when it has
     /// heard, so that the queue holds one event of the telegram, not one for each station. Where links have jitter, who
-    /// is nearest differs from telegram to telegram, and all are told now.
+    /// is nearest differs from telegram to telegram, and all are told now; so where receivers have.
     fn broadcast(&mut self, sender: usize, id: FlightId) {
         if self.bus.flight(id).mark.apart {
             self.bus.add_listeners(id, 1);
@@ -594,7 +606,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             0 => return self.bus.unheard(id),
             count => self.bus.add_listeners(id, count as u16),
         }
-        if self.bus.delays().is_steady() {
+        if self.bus.delays().is_steady() && !self.faults.strays_arrivals() {
             return self.tell_neighbour(id, 0);
         }
         for rank in 0..count {
@@ -609,7 +621,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// The telegram's end reaches `listener`. Of telegrams that end there at one instant the one sent first comes first.
     fn push_telegram(&mut self, listener: usize, id: FlightId, event: Event) {
-        let (at, number) = self.bus.arrival(id, listener);
+        let (mut at, number) = self.bus.arrival(id, listener);
+        if self.faults.strays_arrivals() {
+            let running = (self.bus.flight(id).start, self.clocks_begun(false));
+            at += self.faults.capture_stray(self.slots[listener].address, running);
+            // Nobody hears what has not been said.
+            at = at.max(self.bus.flight(id).end).max(self.now);
+        }
         let key = Key::new(at, Phase::Telegram, self.slots[listener].address.get(), number);
         self.queue.push(key, NetworkEvent(event));
     }

@@ -220,6 +220,8 @@ pub(super) fn reaches(sigma: Span, bound: Span) -> bool {
 pub struct LinkJitter {
     half_width: Span,
     stream: Stream,
+    /// What disturbances add: name, half width, draws, and whether it counts now.
+    more: Vec<(String, Span, Stream, bool)>,
 }
 
 impl LinkJitter {
@@ -229,11 +231,31 @@ impl LinkJitter {
     /// If `half_width` is negative.
     pub fn new(half_width: Span, seed: u64, link: &str) -> Self {
         assert!(half_width >= Span::ZERO, "half width {half_width} is negative");
-        Self { half_width, stream: Stream::of_link(seed, link, Purpose::Repeater) }
+        Self { half_width, stream: Stream::of_link(seed, link, Purpose::Repeater), more: Vec::new() }
     }
     /// How much later than nominal the next telegram leaves the link. Signed.
     pub fn draw(&mut self) -> Span {
-        self.stream.uniform(self.half_width)
+        let more = self.more.iter_mut().filter(|(.., on)| *on);
+        let own = self.stream.uniform(self.half_width);
+        more.fold(own, |sum, (_, half_width, stream, _)| sum + stream.uniform(*half_width))
+    }
+    /// Adds what the disturbance called `name` makes of the link in a run with `seed`, which does not count yet.
+    ///
+    /// # Panics
+    /// If `half_width` is negative.
+    #[must_use]
+    pub fn with(mut self, half_width: Span, seed: u64, name: &str) -> Self {
+        assert!(half_width >= Span::ZERO, "half width {half_width} is negative");
+        // No station has the address 127.
+        let stream = Stream::of_disturbance(seed, name, 127, Purpose::Repeater);
+        self.more.push((name.to_owned(), half_width, stream, false));
+        self
+    }
+    /// What the disturbance called `name` adds counts from now on, or no more.
+    pub(super) fn disturb(&mut self, name: &str, counts: bool) {
+        for (_, _, _, on) in self.more.iter_mut().filter(|(other, ..)| other == name) {
+            *on = counts;
+        }
     }
 }
 
@@ -305,6 +327,13 @@ mod tests {
         let strays: Vec<i64> = (0..10_000).map(|_| jitter.draw().ticks()).collect();
         assert!(strays.iter().all(|t| t.abs() <= US.ticks()) && strays.iter().any(|t| t.abs() > US.ticks() * 99 / 100));
         assert_eq!(LinkJitter::new(Span::ZERO, SEED, "a").draw(), Span::ZERO);
+        let mut more = LinkJitter::new(Span::ZERO, SEED, "a").with(US, SEED, "more");
+        let mut draws = |on: bool| {
+            more.disturb("other", !on);
+            more.disturb("more", on);
+            more.draw()
+        };
+        assert!(draws(true) != Span::ZERO && draws(false) == Span::ZERO && draws(true) != Span::ZERO);
     }
 
     #[test]

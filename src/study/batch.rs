@@ -198,11 +198,11 @@ fn stage(file: &Path, text: &str) -> Result<Staged, ExportError> {
     Ok(staged)
 }
 
-/// The file and the overrides of a run as words for a shell.
+/// The file and the overrides of a run as `isodp replay` takes them, as words for a shell.
 fn shell(file: &Path, sets: &[(String, String)]) -> String {
     let mut words = quoted(&file.display().to_string());
     for (key, value) in sets {
-        let _ = write!(words, " --set {}", quoted(&format!("{key}={value}")));
+        let _ = write!(words, " --run-set {}", quoted(&format!("{key}={value}")));
     }
     words
 }
@@ -225,7 +225,10 @@ mod tests {
         let set = |key: &str, value: &str| (key.to_owned(), value.to_owned());
         let sets = [set("run.seed", "7"), set("master.t_o", "1.5 ms"), set("x", "it's")];
         let words = shell(Path::new("scenarios/reference.toml"), &sets);
-        assert_eq!(words, r"scenarios/reference.toml --set run.seed=7 --set 'master.t_o=1.5 ms' --set 'x=it'\''s'");
+        assert_eq!(
+            words,
+            r"scenarios/reference.toml --run-set run.seed=7 --run-set 'master.t_o=1.5 ms' --run-set 'x=it'\''s'"
+        );
         assert_eq!(shell(Path::new("my file.toml"), &[]), "'my file.toml'");
     }
 }

@@ -218,8 +218,8 @@ pub fn order<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &
 /// Tells `network` what the disturbances of `scenario` order of masters.
 pub fn order_disturbances<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &Scenario) {
     for (number, disturbance) in scenario.disturbances.iter().enumerate() {
-        if let What::Order(slaves, fault) = &disturbance.what {
-            let [begin, end] = order_bursts(scenario, slaves, *fault);
+        if let What::Order(stations, fault) = &disturbance.what {
+            let [begin, end] = order_bursts(scenario, stations, *fault);
             network.order_bursts(number as u16, &begin, &end);
         }
     }
@@ -250,10 +250,23 @@ fn order_bursts(scenario: &Scenario, slaves: &[Address], fault: OrderFault) -> [
 
 /// The cables; every repeater with jitter has its own draws, by its name.
 fn wiring(scenario: &Scenario) -> Wiring {
-    let repeaters = scenario.topology.repeaters().iter().enumerate();
-    let jitter = repeaters.filter(|(_, repeater)| repeater.jitter > Span::ZERO);
-    let jitter = jitter.map(|(i, repeater)| (i, LinkJitter::new(repeater.jitter, scenario.run.seed, &repeater.name)));
-    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect() }
+    let seed = scenario.run.seed;
+    let jitter = scenario.topology.repeaters().iter().enumerate().filter_map(|(index, repeater)| {
+        let more = scenario.disturbances.iter().filter_map(|disturbance| match disturbance.what {
+            What::Repeater(at, half_width) if at == index => Some((disturbance, half_width)),
+            _ => None,
+        });
+        let own = LinkJitter::new(repeater.jitter, seed, &repeater.name);
+        let mut more = more.peekable();
+        let strays = repeater.jitter > Span::ZERO || more.peek().is_some();
+        let jitter = more.fold(own, |jitter, (disturbance, width)| jitter.with(width, seed, &disturbance.name));
+        strays.then_some((index, jitter))
+    });
+    let cuts = scenario.disturbances.iter().filter_map(|disturbance| match disturbance.what {
+        What::Cut(place) => Some((disturbance.name.clone(), place)),
+        _ => None,
+    });
+    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect(), cuts: cuts.collect() }
 }
 
 /// Where a station is.

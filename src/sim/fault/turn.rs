@@ -73,6 +73,15 @@ impl Turns {
         let at = if self.on { bursts.end(self.burst) } else { bursts.begin(self.burst) };
         at.map(turn)
     }
+    /// Leaves out a burst that would have begun before `now`, and before the cycle of this number.
+    pub fn leave_out_past(&mut self, now: Time, cycle: u64) {
+        let past = match self.next() {
+            Some(Turn::Time(at)) => at < now.ticks(),
+            Some(Turn::Cycle(at)) => at < cycle as i64,
+            None => false,
+        };
+        self.burst += u64::from(past && !self.on);
+    }
     /// It turns. Whether a burst begins; otherwise one ends.
     pub const fn turn(&mut self) -> bool {
         self.on = !self.on;
@@ -120,6 +129,21 @@ mod tests {
         assert_eq!(next, [first, first, first, second, second, second, second, None, None]);
         let once = Turns::from(Window::Time(Bursts::once(4, None)), Time::from_ticks(100), 0);
         assert_eq!(once.next(), Some(Turn::Time(4)));
+    }
+
+    #[test]
+    fn a_beginning_that_is_past_can_be_left_out() {
+        let bursts = Bursts { from: 4, length: Some(3), every: Some(8), times: Some(2) };
+        let next = [0, 4, 5, 7, 12, 13, 99].map(|cycle| {
+            let mut turns = Turns::from(Window::Cycles(bursts), Time::ZERO, cycle);
+            turns.leave_out_past(Time::ZERO, cycle);
+            turns.next()
+        });
+        let (first, second) = (Some(Turn::Cycle(4)), Some(Turn::Cycle(12)));
+        assert_eq!(next, [first, first, second, second, second, None, None]);
+        let mut once = Turns::from(Window::Time(Bursts::once(4, None)), Time::from_ticks(100), 0);
+        once.leave_out_past(Time::from_ticks(100), 0);
+        assert_eq!(once.next(), None);
     }
 
     #[test]

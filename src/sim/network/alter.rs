@@ -20,7 +20,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     pub fn change_jitter(&mut self, jitter: GcJitter) -> Result<(), JitterError> {
         self.jitter.change(jitter)
     }
-    /// From now on these are the disturbances.
+    /// From now on these are the disturbances. What one would have put on the line at a beginning that is past does not
+    /// come.
     pub fn set_faults(&mut self, mut faults: Faults) {
         let turning = faults.take_turning();
         faults.go_on_from(&self.faults);

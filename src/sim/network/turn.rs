@@ -38,6 +38,10 @@ pub(super) enum Effect<C> {
     None,
     /// The supply goes off and on.
     Supply,
+    /// A link has more jitter.
+    Link,
+    /// A cable is cut and whole again.
+    Cut,
     /// Crystals run at other rates.
     Crystals(Tuning),
     /// Something comes onto the line.
@@ -54,7 +58,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
     }
     /// From now on these are the disturbances that begin and end. One that was there before goes on as it is, any other
-    /// begins where its window is now.
+    /// begins where its window is now; what comes once at a beginning that is past does not come.
     pub(super) fn turn_over(&mut self, all: Vec<fault::Turning>) {
         let known = |turning: &Turning<_>, new: &fault::Turning| {
             !turning.retired
@@ -68,10 +72,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
         }
         for mut new in all {
-            if !self.turning.iter().any(|turning| known(turning, &new)) {
-                new.turns = Turns::from(new.turns.window(), self.now, self.clocks);
-                self.add_turning(new);
+            if self.turning.iter().any(|turning| known(turning, &new)) {
+                continue;
             }
+            new.turns = Turns::from(new.turns.window(), self.now, self.clocks);
+            if new.source.as_ref().is_some_and(|source| !source.goes_on()) {
+                new.turns.leave_out_past(self.now, self.clocks);
+            }
+            self.add_turning(new);
         }
     }
     fn add_turning(&mut self, new: fault::Turning) {
@@ -84,7 +92,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             What::Station(_, StationFault::Restart) => Effect::Supply,
             What::Crystal(_, fault) => Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false }),
             What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
-            What::Line(_) | What::Source(_) | What::Station(..) | What::Clock(..) => {
+            What::Repeater(..) => Effect::Link,
+            What::Cut(_) => Effect::Cut,
+            What::Line(_) | What::Source(_) | What::Station(..) | What::Clock(..) | What::Instant(..) => {
                 source.map_or(Effect::None, Effect::Source)
             }
         };
@@ -99,7 +109,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             self.push(self.now, Phase::Command, slot, Event::Turn(index as u16));
         }
     }
-    fn slot_of(&self, station: Address) -> Option<usize> {
+    pub(super) fn slot_of(&self, station: Address) -> Option<usize> {
         self.by_address[usize::from(station.get())].map(usize::from)
     }
     /// What the disturbance of this number, from 0, orders when a burst begins and when one ends.
@@ -117,7 +127,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// Sees to it that the disturbance turns next when it has to.
-    fn plan_turn(&mut self, index: usize) {
+    pub(super) fn plan_turn(&mut self, index: usize) {
         let Turning { turns, slots, retired, .. } = &self.turning[index];
         if *retired {
             return;
@@ -172,6 +182,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Effect::Crystals(_) => self.turn_crystals(index, on),
             Effect::Orders { fault, .. } => self.order_burst((index, fault), on, recorder),
             Effect::Source(_) if on => self.start_source(index),
+            Effect::Link => self.bus.disturb_link(&self.turning[index].name, on),
+            Effect::Cut => self.bus.cut(&self.turning[index].name, on, self.now),
             Effect::Source(_) | Effect::None | Effect::Supply => {}
         }
         self.plan_turn(index);

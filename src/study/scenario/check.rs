@@ -68,6 +68,8 @@ static STAGES: &[Stage] = &[
         disturbance::application::are_slaves,
         disturbance::clock::are_crystals,
         disturbance::token::are_masters,
+        disturbance::path::in_order,
+        disturbance::path::few_cuts,
         services::commands,
         expect::subjects,
     ]),
@@ -504,7 +506,7 @@ fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
         let named = match &disturbance.what {
             What::Line(LineFault { which: Which { from, to, .. }, .. }) => [("from", *from), ("to", *to)],
             What::Source(source) => [("near", source.near), ("near", None)],
-            What::Station(..) | What::Crystal(..) | What::Order(..) | What::Clock(..) => continue,
+            _ => continue,
         };
         for (key, station) in named {
             if let Some(address) = station

@@ -6,6 +6,7 @@ pub(super) mod clock;
 mod gc_jitter;
 mod line;
 mod manner;
+pub(super) mod path;
 mod source;
 pub(super) mod station;
 pub(super) mod token;
@@ -65,6 +66,10 @@ pub const DISTURBANCES: &[DisturbanceKind] = &[
     clock::CRYSTAL_OFFSET,
     clock::CRYSTAL_WANDER,
     clock::TEMPERATURE_STEP,
+    path::RECEIVER_JITTER,
+    path::REPEATER_JITTER,
+    path::T_SDR_JITTER,
+    path::CABLE_CUT,
     application::HOLD_LIFE_SIGN,
     application::JUMP_LIFE_SIGN,
     application::REPEAT_LIFE_SIGN,

@@ -90,7 +90,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses, topology.as_ref()));
     let links = list(reader, &root, "link", link);
     let events = list(reader, &root, "event", |section, reader| event(section, reader, &addresses));
-    reader.around = Around { slaves: addresses };
+    reader.around = Around { slaves: addresses, topology: topology.clone(), rate };
     let disturbances = disturbances(reader, &root);
     let record = record(Section::of_file(reader, &root, "record"), reader);
     let expectations = expect::read(reader, &root, rate);

@@ -2,6 +2,7 @@
 
 use super::Run;
 use super::error::{Fault, Problem};
+use super::topology::Topology;
 use super::tree::{Node, Place, Source, Table, Value};
 use crate::study::quantity::{QuantityError, span};
 use crate::time::{BitRate, Span};
@@ -28,6 +29,8 @@ pub(super) struct Reader<'a> {
 pub(super) struct Around {
     /// Addresses of all slaves, in order.
     pub(super) slaves: Vec<Address>,
+    pub(super) topology: Option<Topology>,
+    pub(super) rate: BitRate,
 }
 
 impl<'a> Reader<'a> {
@@ -38,7 +41,7 @@ impl<'a> Reader<'a> {
             places: BTreeMap::new(),
             gsd_files: BTreeMap::new(),
             proposes: false,
-            around: Around { slaves: Vec::new() },
+            around: Around { slaves: Vec::new(), topology: None, rate: BitRate::M12 },
             problems: Vec::new(),
         }
     }

@@ -16,7 +16,7 @@ use crate::sim::motion::Shaft;
 use crate::sim::network::{Network, NetworkEvent};
 use crate::sim::queue::Queue;
 use crate::study::build;
-use crate::study::scenario::{Event, Scenario, When};
+use crate::study::scenario::{Disturbance, Event, Scenario, What, When};
 use crate::time::Time;
 
 /// The keys that can change, for messages.
@@ -47,7 +47,16 @@ fn in_the_old_world(original: &Scenario, altered: &Scenario) -> Scenario {
 
 /// Whether a network of `original` that runs can become one of `altered`.
 pub(super) fn can_change(original: &Scenario, altered: &Scenario) -> bool {
-    in_the_old_world(original, altered) == *original
+    // What a repeater may add, and where a cable may be cut, is part of the paths.
+    let paths = |scenario: &Scenario| -> Vec<Disturbance> {
+        scenario
+            .disturbances
+            .iter()
+            .filter(|disturbance| matches!(disturbance.what, What::Repeater(..) | What::Cut(_)))
+            .cloned()
+            .collect()
+    };
+    in_the_old_world(original, altered) == *original && paths(altered) == paths(original)
 }
 
 /// Those of `events` that have not come at `now`, before `cycle` begins.

@@ -34,7 +34,7 @@ pub(super) const CRYSTAL_OFFSET: DisturbanceKind = DisturbanceKind {
 /// A random walk.
 pub(super) const CRYSTAL_WANDER: DisturbanceKind = DisturbanceKind {
     name: "crystal-wander",
-    what: "the crystals of these stations wander, each by itself: a `step` to either side every `interval`, turned back at `bound`",
+    what: "the crystals of these stations wander by themselves: a `step` up or down every `interval`, up to `bound`",
     keys: &[
         STATION,
         STATIONS,

@@ -45,7 +45,7 @@ pub(super) const GC_JITTER: DisturbanceKind = DisturbanceKind {
     keys: &[
         SHAPE, ACCUMULATE, WIDTH, SIGMA, BOUND, AMPLITUDE, PERIOD, OFFSET, PER_CYCLE, PER_SECOND, OFFSETS, FILE, REPEAT,
     ],
-    example: r#"kind = "gc-jitter", shape = "sine", amplitude = "400 ns", period = "200 ms", at = "1 s", for = "5 s""#,
+    example: r#"kind = "gc-jitter", shape = "sine", amplitude = "400 ns", period = "200 ms", at = "1 s""#,
     read: |section, reader| {
         let jitter = jitter::shape("shape", section, reader);
         let accumulates = section.optional(reader, "accumulate", yes).unwrap_or(false);
