@@ -106,7 +106,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             self.push(self.now, Phase::Command, slot, Event::Turn(index as u16));
         }
     }
-    pub(super) fn slot_of(&self, station: Address) -> Option<usize> {
+    fn slot_of(&self, station: Address) -> Option<usize> {
         self.by_address[usize::from(station.get())].map(usize::from)
     }
     /// What the disturbance of this number, from 0, orders when a burst begins and when one ends.

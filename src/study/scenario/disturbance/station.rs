@@ -99,6 +99,9 @@ pub(in crate::study::scenario) fn come_back(facts: &Facts<'_>, reader: &mut Read
 pub(in crate::study::scenario) fn are_there(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let all: Vec<_> = facts.scenario.stations().map(|station| station.address).collect();
     for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
+        if let What::Source(_) = disturbance.what {
+            continue; // It has a key of its own for that.
+        }
         let mut named = disturbance.what.stations().iter();
         if let Some(address) = named.find(|address| !all.contains(address)) {
             let mut known = all.clone();
