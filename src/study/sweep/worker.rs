@@ -172,7 +172,9 @@ mod tests {
             if jobs.is_empty() {
                 break;
             }
-            jobs.iter().for_each(|job| append(&mut journal, job, if job.repetition % 2 == 0 { 90 } else { 110 }));
+            for job in &jobs {
+                append(&mut journal, job, if job.repetition % 2 == 0 { 90 } else { 110 });
+            }
         }
         assert_eq!(counts, [12, 15, 18, 22, 27, 33, 40, 40], "given up at the most");
         narrow.jobs().for_each(|job| append(&mut journal, &job, 100));
