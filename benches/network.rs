@@ -12,6 +12,7 @@
 //! | ratio | network over loop |
 //! | bare | the network with nobody who reads it |
 //! | prints | the network with its fingerprints instead of histograms |
+//! | flight | the network with rows, histograms and the flight recorder, which finds nothing |
 //!
 //! Every network is in operation before the time is taken, and the loop's results are compared with the network's.
 
@@ -22,10 +23,11 @@ use isodp::sim::fingerprint::Fingerprints;
 use isodp::sim::motion::Shaft;
 use isodp::sim::network::{Network, Until};
 use isodp::sim::record::Recorder;
+use isodp::study::flight::FlightRecorder;
 use isodp::study::histogram::Histograms;
 use isodp::study::metric::{Metrics, Shafts};
 use isodp::study::run;
-use isodp::study::scenario::Scenario;
+use isodp::study::scenario::{Flight, Scenario};
 use isodp::time::Time;
 use isodp::wire::Address;
 use straight::effort::Effort;
@@ -67,7 +69,7 @@ impl<R: Recorder> Watched<R> {
 
 fn main() {
     let effort = Effort::of_arguments();
-    println!("encoders      T_DP   network [ns]   loop [ns]   ratio   bare [ns]   prints [ns]");
+    println!("encoders      T_DP   network [ns]   loop [ns]   ratio   bare [ns]   prints [ns]   flight [ns]");
     for number in [1, 8, 32, 122] {
         check::same_results(number, effort.compared);
         let scenario = encoders::scenario(number);
@@ -75,21 +77,25 @@ fn main() {
         let mut straight = check::caught_up::<true>(&scenario, &network, &start);
         let layout = run::layout(&scenario);
         let metrics = Metrics::new(layout.clone(), Speeds::of(&scenario), Histograms::new(&layout));
+        let again = Metrics::new(layout.clone(), Speeds::of(&scenario), Histograms::new(&layout));
+        let recorder = FlightRecorder::new(&scenario, &Flight::default());
+        let mut flight = Watched::new(&scenario, (again, recorder));
         let mut full = Watched { network, recorder: metrics };
         let mut bare = Watched::new(&scenario, ());
         let mut prints = Watched::new(&scenario, Fingerprints::new(scenario.master.address));
-        let [full, straight, bare, prints] = effort.medians(
+        let [full, straight, bare, prints, flight] = effort.medians(
             number,
             [
                 &mut |cycles| full.run(cycles),
                 &mut |cycles| straight.run(cycles, &mut ()),
                 &mut |cycles| bare.run(cycles),
                 &mut |cycles| prints.run(cycles),
+                &mut |cycles| flight.run(cycles),
             ],
         );
         let (t_dp, ratio) = (scenario.master.t_dp.to_string(), full / straight);
         println!(
-            "{number:>8}  {t_dp:>8}   {full:>12.1}   {straight:>9.1}   {ratio:>5.2}   {bare:>9.1}   {prints:>11.1}"
+            "{number:>8}  {t_dp:>8}   {full:>12.1}   {straight:>9.1}   {ratio:>5.2}   {bare:>9.1}   {prints:>11.1}   {flight:>11.1}"
         );
     }
 }

@@ -11,21 +11,22 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use isodp::sim::network::NetworkEvent;
 use isodp::sim::queue::NearQueue;
+use isodp::study::budget::Budget;
+use isodp::study::export::capture;
 use isodp::study::gsd::Gsd;
 use isodp::study::plan::command::{Call as PlanCall, answer};
-use isodp::study::plan::rules::warnings;
-use isodp::study::replay::{Window, replay};
-use isodp::study::run::{Outcome, Progress, layout, run};
+use isodp::study::replay::{self, Window};
+use isodp::study::run::{Progress, layout};
 use isodp::study::scenario::{Extent, Scenario, disturbance};
 use isodp::study::sweep::command::{Call, End, Progress as SweepProgress, join, sweep};
 use isodp::study::sweep::crew::cores;
 use isodp::study::sweep::is_at_work;
 use isodp::study::sweep::shard::Shard;
 use isodp::study::what_if::command as what_if;
-use isodp::study::{devices, figure, report};
+use isodp::study::{batch, devices, figure};
 use isodp::time::Span;
 
-/// A planned network breaks a rule, or a GSD file is inconsistent.
+/// An expectation of a run fails, a planned network breaks a rule, or a GSD file is inconsistent.
 const VIOLATED: u8 = 1;
 /// A wrong call, scenario or file.
 const USAGE: u8 = 2;
@@ -48,10 +49,17 @@ Examples:
       What the profile of this device says; without a name, all devices.
   isodp gsd scenarios/gsd/isodp_posital_06df.gsd
       What a GSD file says; scenarios use it with device = { gsd = FILE }.
+  isodp budget scenarios/gc-jitter.toml
+      What uses up the clock window T_PLL_W of each encoder: jitter, crystals, timer grid, loop.
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
+  isodp run scenarios/reference.toml scenarios/startup.toml --junit verdicts.xml
+      Several scenarios side by side; what became of their expectations, also as JUnit XML.
+  isodp run scenarios/reference.toml --set expect.latch_skew.p99='<= 400 ns'
+      The same with another expectation; isodp figures lists what can be expected.
 
-Exit codes: 0 done, 1 a planned rule is violated or a GSD file is inconsistent, 2 wrong usage, scenario or file.";
+Exit codes: 0 done and every expectation holds, 1 an expectation fails, a planned rule is violated or a GSD file is
+inconsistent, 2 wrong usage, scenario or file.";
 
 const GSD_CODES: &str = "\
 Exit codes: 0 the file fits together (notes are no fault), 1 it is inconsistent: one of the findings is an error, 2 it cannot be read.";
@@ -69,12 +77,15 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Runs a scenario and leaves figures, tables, histograms and plots.
+    /// Runs scenarios and leaves figures, tables, histograms and plots; tells whether their expectations hold.
     #[command(after_help = EXAMPLES)]
     Run(RunArgs),
     /// Reckons what a scenario's bus cycle will be, and which rules its times keep, without simulating it.
     #[command(after_help = EXAMPLES)]
     Plan(PlanArgs),
+    /// Shares out the clock window T_PLL_W of each encoder among jitter, crystals and timer grid, by switching them off.
+    #[command(after_help = EXAMPLES)]
+    Budget(BudgetArgs),
     /// Runs a scenario again and tells a stretch of it, every telegram and every observation, line by line.
     #[command(after_help = EXAMPLES)]
     Replay(ReplayArgs),
@@ -86,8 +97,8 @@ enum Command {
     Merge(MergeArgs),
     /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
-    /// Lists the disturbances that a scenario can name, with their keys and an example of each.
-    Disturbances,
+    /// Lists the disturbances that a scenario can name, with their keys and an example of each, or tells about one.
+    Disturbances(DisturbancesArgs),
     /// Lists the figures that a run can be asked for by name: all families, or the names of one scenario.
     Figures(FiguresArgs),
     /// Shows what a GSD file says, what of it is ignored and what does not fit.
@@ -98,6 +109,13 @@ enum Command {
 #[derive(Args)]
 struct DevicesArgs {
     /// The device to tell about.
+    #[arg(value_name = "NAME")]
+    name: Option<String>,
+}
+
+#[derive(Args)]
+struct DisturbancesArgs {
+    /// The disturbance to tell about.
     #[arg(value_name = "NAME")]
     name: Option<String>,
 }
@@ -181,6 +199,9 @@ struct ReplayArgs {
     /// Seed of all random streams, instead of the scenario's.
     #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
     seed: Option<u64>,
+    /// Writes flight.txt, flight.pcapng with its dissector and flight.vcd of these cycles too, to DIR/<scenario>/.
+    #[arg(long, value_name = "DIR", conflicts_with = "sets")]
+    out: Option<PathBuf>,
     /// What if: from the cycle on another future runs beside the original, with this value of the scenario, for example
     /// slave.3.crystal='40 ppm'. May be given several times.
     #[arg(long = "set", visible_alias = "what-if", value_name = "KEY=VALUE", value_parser = assignment)]
@@ -191,7 +212,7 @@ struct ReplayArgs {
 }
 
 #[derive(Args)]
-struct RunArgs {
+struct BudgetArgs {
     /// Scenario file (TOML).
     #[arg(value_name = "FILE")]
     scenario: PathBuf,
@@ -204,6 +225,28 @@ struct RunArgs {
     /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
     sets: Vec<(String, String)>,
+}
+
+#[derive(Args)]
+struct RunArgs {
+    /// Scenario files (TOML).
+    #[arg(value_name = "FILE", required = true)]
+    scenarios: Vec<PathBuf>,
+    /// Seed of all random streams, instead of the scenario's.
+    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
+    seed: Option<u64>,
+    /// Directory for the results; they go to DIR/<scenario>/.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    sets: Vec<(String, String)>,
+    /// File for the verdicts on the expectations as JUnit XML.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// File for the verdicts on the expectations as JSON.
+    #[arg(long, value_name = "FILE")]
+    verdicts: Option<PathBuf>,
 }
 
 fn assignment(text: &str) -> Result<(String, String), String> {
@@ -219,13 +262,14 @@ fn seed(text: &str) -> Result<u64, String> {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Run(args) => run_command(args).map(done),
+        Command::Run(args) => run_command(args),
         Command::Plan(args) => plan_command(args),
+        Command::Budget(args) => budget_command(args).map(done),
         Command::Replay(args) => replay_command(args).map(done),
         Command::Sweep(args) => sweep_command(args),
         Command::Merge(args) => merge_command(&args),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
-        Command::Disturbances => Ok(done(disturbance::list())),
+        Command::Disturbances(args) => disturbances_command(args.name.as_deref()).map(done),
         Command::Figures(args) => figures_command(args.scenario.as_deref()).map(done),
         Command::Gsd(args) => gsd_command(&args.file),
     };
@@ -255,16 +299,25 @@ fn show(page: &str) -> Result<(), Box<dyn std::error::Error>> {
     }
 }
 
-fn run_command(args: RunArgs) -> Result<String, Box<dyn std::error::Error>> {
-    let scenario = Scenario::load(&args.scenario, &with_seed(args.sets, args.seed))?;
-    for warning in warnings(&scenario) {
+fn run_command(args: RunArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
+    let RunArgs { scenarios: files, seed, out, sets, junit, verdicts } = args;
+    let call = batch::Call { files, sets: with_seed(sets, seed), out, junit, verdicts };
+    let scenarios = batch::load(&call)?;
+    for warning in batch::warnings_of(&scenarios) {
         // Where standard error is gone, the summary tells.
         let _ = writeln!(anstream::stderr(), "warning: {warning}");
     }
-    let bar = Bar::new(&scenario);
-    let Outcome { summary, dir, .. } = run::<NearQueue<NetworkEvent>>(&scenario, Some(&args.out), |at| bar.show(at))?;
-    bar.line.finish_and_clear();
-    Ok(report::render(&summary, dir.as_ref().map(|dir| dir.display().to_string()).as_deref()))
+    let bar = match &scenarios[..] {
+        [scenario] => Some(Bar::new(scenario)),
+        _ => None,
+    };
+    let watch = |at| bar.iter().for_each(|bar| bar.show(at));
+    let answer = batch::answer(&call, &scenarios, watch)?;
+    if let Some(bar) = &bar {
+        bar.line.finish_and_clear();
+    }
+    let code = if answer.passed { ExitCode::SUCCESS } else { ExitCode::from(VIOLATED) };
+    Ok((answer.page, code))
 }
 
 fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
@@ -274,8 +327,32 @@ fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error
     Ok((answer.page, code))
 }
 
+fn budget_command(args: BudgetArgs) -> Result<String, Box<dyn std::error::Error>> {
+    let scenario = Scenario::load(&args.scenario, &with_seed(args.sets, args.seed))?;
+    for warning in batch::warnings_of(std::slice::from_ref(&scenario)) {
+        let _ = writeln!(anstream::stderr(), "warning: {warning}");
+    }
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    bar.set_prefix(scenario.name.clone());
+    bar.set_style(
+        ProgressStyle::with_template("{prefix} [{bar:30}] {pos} of {len} runs").expect("a template that is right"),
+    );
+    let budget = Budget::of(&scenario, |runs| {
+        bar.set_length(runs as u64);
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    let dir = args.out.join(&scenario.name);
+    let files = budget.write(&scenario, &dir)?;
+    Ok(format!("{}{} in {}\n", budget.page(), files.join(", "), dir.display()))
+}
+
 fn devices_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
     Ok(name.map_or_else(|| Ok(devices::list()), devices::full)?)
+}
+
+fn disturbances_command(name: Option<&str>) -> Result<String, Box<dyn std::error::Error>> {
+    Ok(name.map_or_else(|| Ok(disturbance::list()), disturbance::full)?)
 }
 
 fn figures_command(file: Option<&Path>) -> Result<String, Box<dyn std::error::Error>> {
@@ -286,13 +363,19 @@ fn figures_command(file: Option<&Path>) -> Result<String, Box<dyn std::error::Er
 }
 
 fn replay_command(args: ReplayArgs) -> Result<String, Box<dyn std::error::Error>> {
-    let ReplayArgs { scenario: file, cycle, window, seed, sets, run_sets } = args;
+    let ReplayArgs { scenario: file, cycle, window, seed, out, sets, run_sets } = args;
     let run_sets = with_seed(run_sets, seed);
     if !sets.is_empty() {
         return what_if::answer(&what_if::Call { file, run_sets, sets, cycle, window });
     }
     let scenario = Scenario::load(&file, &run_sets)?;
-    Ok(replay::<NearQueue<NetworkEvent>>(&scenario, Window::around(cycle, window.unwrap_or(0)))?)
+    let around = Window::around(cycle, window.unwrap_or(0));
+    let recording = replay::record::<NearQueue<NetworkEvent>>(&scenario, around)?;
+    let page = replay::text(&recording);
+    let Some(out) = out else { return Ok(page) };
+    let dir = out.join(&scenario.name);
+    let files = capture::write(&dir, &recording)?;
+    Ok(format!("{page}\n{} files in {}\n", files.len(), dir.display()))
 }
 
 fn sweep_command(args: SweepArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {

@@ -718,7 +718,9 @@ pub enum Observation {
         /// Who was sending already.
         with: Address,
     },
-    /// The scenario disturbed a telegram of this station.
+    /// An order of the scenario came while this station had no supply.
+    OrderLost,
+    /// The scenario disturbed this station, a telegram of it, or the line at its place.
     Disturbed {
         /// Number of the disturbance in the scenario, from 0.
         number: u16,
@@ -728,10 +730,24 @@ pub enum Observation {
 }
 
 named! {
-    /// What the scenario did to one telegram.
+    /// What the scenario did to one telegram, to a station, or put on the line at its place.
     Disturbance {
+        /// A burst of a disturbance begins.
+        Begins = "begins",
+        /// A burst of a disturbance is over.
+        Ends = "ends",
         /// It never reached the line.
         Lost = "telegram lost",
+        /// It left late.
+        Late = "telegram late",
+        /// It comes a second time.
+        Doubled = "telegram doubled",
+        /// Some of its bits are wrong.
+        WrongBits = "wrong bits",
+        /// Characters without sense came onto the line.
+        Noise = "noise",
+        /// A telegram of nobody came onto the line.
+        Foreign = "foreign telegram",
     }
 }
 
@@ -886,6 +902,10 @@ impl fmt::Display for Observation {
             Self::Used { publisher, position } => write!(f, "position {position} of publisher {publisher} used"),
             Self::Link { publisher, from, to } => write!(f, "link to {publisher}: {from} -> {to}"),
             Self::Collision { with } => write!(f, "collision with {with}"),
+            Self::OrderLost => f.write_str("an order is lost, there is no supply"),
+            Self::Disturbed { number, how: how @ (Disturbance::Begins | Disturbance::Ends) } => {
+                write!(f, "disturbance {} {how}", number + 1)
+            }
             Self::Disturbed { how, .. } => write!(f, "disturbed: {how}"),
         }
     }

@@ -8,11 +8,13 @@ use isodp::device::node::Node;
 use isodp::sim::fingerprint::Fingerprints;
 use isodp::sim::network::{Network, NetworkEvent, Until};
 use isodp::sim::queue::{HeapQueue, NearQueue, Queue};
+use isodp::sim::record::Recorder;
 use isodp::study::build;
+use isodp::study::flight::FlightRecorder;
 use isodp::study::histogram::Histograms;
 use isodp::study::metric::Metrics;
 use isodp::study::run;
-use isodp::study::scenario::Scenario;
+use isodp::study::scenario::{Flight, Scenario};
 
 /// Cycles until everything is locked, linked and polled once: queues and buffers have their final size.
 const START: u64 = 1_000;
@@ -30,9 +32,14 @@ fn shipped(name: &str, sets: &[(&str, &str)]) -> Scenario {
 
 /// Allocations of the watched cycles, with metrics, histograms and fingerprints.
 fn allocations<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> u64 {
+    allocations_beside::<Q>(scenario, ())
+}
+/// The same with a further recorder.
+fn allocations_beside<Q: Queue<NetworkEvent>>(scenario: &Scenario, further: impl Recorder) -> u64 {
     let layout = run::layout(scenario);
     let histograms = Histograms::new(&layout);
-    let mut recorder = (Fingerprints::new(scenario.master.address), Metrics::new(layout, |_, _| 0.0, histograms));
+    let metrics = Metrics::new(layout, |_, _| 0.0, histograms);
+    let mut recorder = (Fingerprints::new(scenario.master.address), (metrics, further));
     let mut network: Network<Node, Q> = build::network(scenario);
     assert!(network.run(Until::Cycle(START), u64::MAX, &mut recorder));
     let info = allocation_counter::measure(|| {
@@ -75,6 +82,30 @@ fn a_fault_and_its_acknowledgement_allocate_nothing() {
 }
 
 #[test]
+fn disturbances_of_the_line_allocate_nothing() {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/two-masters.toml"));
+    let mut text = text.expect("a scenario").replace("cycles = 1000", "cycles = 3000");
+    for keys in [
+        "kind = \"lost-telegrams\"\nrate = \"1 %\"\nservice = \"data-exchange\"",
+        "kind = \"lost-telegrams\"\npattern = \"x...............\"\nservice = \"fdl-status\"",
+        "kind = \"missing-clocks\"\nrate = \"1 %\"",
+        "kind = \"late-telegrams\"\nup_to = \"2 us\"\nservice = \"replies\"",
+        "kind = \"duplicate-telegrams\"\nrate = \"5 %\"\nservice = \"replies\"",
+        "kind = \"bit-errors\"\nrate = \"1e-5\"",
+        "kind = \"wrong-octet\"\noctet = 8\nflip = 3\nrate = \"1 %\"\nto = 4",
+        "kind = \"noise\"\nmean = \"5 ms\"\noctets_to = 4",
+        "kind = \"noise\"\ncycle = 0\nfor = 1\nevery = 30\nafter = \"30 us\"",
+        "kind = \"foreign-telegram\"\nat = \"1 ms\"\nfor = \"1 ms\"\nevery = \"41 ms\"\ndata = { to = 4, from = 9, fc = 0x49 }",
+        "kind = \"late-token\"\nstation = 12\nby = \"20 us\"\ncycle = 1\nfor = 10\nevery = 25",
+    ] {
+        text += "\n[[disturbance]]\n";
+        text += keys;
+    }
+    let disturbed = Scenario::parse("line", "line.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
+}
+
+#[test]
 fn a_token_that_goes_round_allocates_nothing() {
     for set in [("bus.gap_factor", "20"), ("bus.gap_factor", "1"), ("bus.t_tr", "300000 tbit")] {
         assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("two-masters", &[set])), 0, "{set:?}");
@@ -91,4 +122,29 @@ fn links_in_both_tables_and_a_lost_publisher_allocate_nothing() {
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-network", &[])), 0);
     let sets = [("run.duration", "5 s"), ("event.1.at", "2.2 s"), ("event.2.at", "4.5 s")];
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&shipped("dxb-lost-publisher", &sets)), 0);
+}
+
+/// Every kind of a disturbance that begins and ends, several of them again and again.
+#[test]
+fn disturbances_of_stations_allocate_nothing() {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/reference.toml"));
+    let text = text.expect("a scenario")
+        + "\n[[disturbance]]\nkind = \"silent\"\nstation = 3\ncycle = 500\nfor = 1\nevery = 50\n\
+           [[disturbance]]\nkind = \"deaf\"\nstation = 4\ncycle = 510\nfor = 1\nevery = 50\n\
+           [[disturbance]]\nkind = \"crystal-wander\"\nstations = \"all slaves\"\nstep = \"10 ppb\"\ninterval = \"1 ms\"\nbound = \"2 ppm\"\n\
+           [[disturbance]]\nkind = \"temperature-step\"\nstation = 2\noffset = \"9 ppm\"\ntime_constant = \"1 s\"\ncycle = 500\nfor = 200\nevery = 400\n\
+           [[disturbance]]\nkind = \"hold-life-sign\"\nstation = 5\ncycle = 520\nfor = 1\nevery = 50\n";
+    let disturbed = Scenario::parse("disturbed", "disturbed", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
+    assert_eq!(allocations::<HeapQueue<NetworkEvent>>(&disturbed), 0);
+}
+
+/// The stretches that it keeps take room; the cycles that come and go do not.
+#[test]
+fn a_flight_recorder_that_keeps_nothing_allocates_nothing() {
+    for name in ["reference", "repeaters", "dxb-network"] {
+        let scenario = shipped(name, &[("run.duration", "10 s")]);
+        let flight = FlightRecorder::new(&scenario, &Flight::default());
+        assert_eq!(allocations_beside::<NearQueue<NetworkEvent>>(&scenario, flight), 0, "{name}");
+    }
 }

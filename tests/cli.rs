@@ -78,7 +78,7 @@ impl Room {
     }
     /// Calls the program, which says exactly `expected`, ends with 2 and leaves everything as it was.
     #[track_caller]
-    fn refuses(&self, arguments: &[&str], expected: &str) {
+    pub(crate) fn refuses(&self, arguments: &[&str], expected: &str) {
         let before = self.contents();
         let output = self.call(arguments);
         assert_eq!(text(&output.stderr).trim_end(), expected.trim(), "{arguments:?}");
@@ -416,7 +416,7 @@ fn calls_that_are_wrong() {
     }
     room.refuses(
         &["run"],
-        "error: the following required arguments were not provided:\n  <FILE>\n\nUsage: isodp run <FILE>\n\nFor more \
+        "error: the following required arguments were not provided:\n  <FILE>...\n\nUsage: isodp run <FILE>...\n\nFor more \
          information, try '--help'.",
     );
     room.refuses(

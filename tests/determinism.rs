@@ -36,7 +36,9 @@ fn the_program_and_the_library_agree_on_every_scenario() {
     for name in shipped() {
         let Outcome { fingerprint, statistics, .. } = outcome(&scenario(&name, &[]));
         let file = format!("{}/scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-        let page = room.runs(&["run", &file, "--set", "record.files=false"]);
+        let output = room.call(&["run", &file, "--set", "record.files=false"]);
+        let page = String::from_utf8(output.stdout).expect("text");
+        assert_eq!((output.status.code(), output.stderr), (Some(i32::from(name == "canary")), Vec::new()), "{name}");
         let line = format!("fingerprint: {fingerprint}  statistics {statistics:016x}");
         assert_eq!(page.lines().find(|line| line.starts_with("fingerprint")), Some(line.as_str()), "{name}");
     }

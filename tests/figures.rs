@@ -256,7 +256,7 @@ fn instants_are_those_of_the_events() {
         let change = |what: &Observation| {
             matches!(what, Observation::SlaveState { .. } | Observation::Phase { .. } | Observation::Pll { .. })
         };
-        let last = own().filter(|row| change(&row.what)).last().expect("a change").at;
+        let last = own().rfind(|row| change(&row.what)).expect("a change").at;
         assert_eq!(at(&format!("slave.{slave}.last_state_change")), last.since_zero());
         let operating = |what: &Observation| matches!(what, Observation::Phase { to: Phase::Operation, .. });
         let first = own().find(|row| operating(&row.what)).expect("operation").at;
@@ -265,6 +265,34 @@ fn instants_are_those_of_the_events() {
     assert_eq!(at("last_state_change"), at("slave.max.last_state_change"));
     let (quiet, _) = outcome("startup", &[]);
     assert_eq!((quiet.get("first_fault"), quiet.get("slave.3.last_fault")), (Ok(None), Ok(None)));
+}
+
+#[test]
+fn times_of_episodes_are_those_of_all_slaves() {
+    use isodp::study::episode::{Harm, Times};
+    for name in ["gc-loss", "life-sign-loss", "dxb-lost-publisher", "startup"] {
+        let (figures, _) = outcome(name, &[]);
+        let episodes = figures.episodes();
+        let faults = episodes.to_harm().iter().filter(|(harm, _)| matches!(harm, Harm::Fault(_)));
+        let faults: Vec<_> = faults.map(|(_, times)| times.histogram()).collect();
+        let recovery: Vec<_> = episodes.recovery().values().map(Times::histogram).collect();
+        for (begin, all) in [("time_to_fault", faults), ("recovery", recovery)] {
+            let get = |statistic: &str| figures.get(&format!("{begin}.{statistic}")).expect("a figure");
+            let count = all.iter().map(|histogram| histogram.count()).sum();
+            assert_eq!(get("count"), Some(Value::Count(count)), "{name}");
+            assert_eq!(get("max"), all.iter().filter_map(|all| all.max()).max().map(Value::Span), "{name}");
+            assert_eq!(get("min"), all.iter().filter_map(|all| all.min()).min().map(Value::Span), "{name}");
+            assert_eq!(get("mean").is_some(), count > 0, "{name}");
+        }
+    }
+    let (figures, _) = outcome("gc-loss", &[]);
+    let get = |name: &str| figures.get(name).expect(name);
+    assert_eq!(
+        (get("slave.3.losses"), get("slave.4.losses"), get("losses")),
+        (Some(Value::Count(1)), Some(Value::Count(0)), Some(Value::Count(1)))
+    );
+    assert_eq!((get("slave.3.recovery.max"), get("slave.4.recovery.max")), (get("recovery.max"), None));
+    assert_eq!(get("unrecovered"), Some(Value::Count(0)));
 }
 
 #[test]
@@ -303,7 +331,7 @@ fn wrong_names_are_told_with_the_nearest_right_one() {
         ("slave.3.t_dx.p99", "there is no figure \"slave.3.t_dx.p99\"; the network has it: \"t_dx.p99\""),
         ("requests", "there is no figure \"requests\"; \"acyclic.<class1 or class2>.requests\" is one"),
         ("something else", "there is no figure \"something else\"; isodp figures lists all of them"),
-        ("", "there is no figure \"\"; a figure comes behind it, such as \".cycles\""),
+        ("", "there is no figure \"\"; isodp figures lists all of them"),
         (
             "slave",
             "\"slave\" says slave and not which; after slave comes an address, each, min and max, such as \"slave.3.lock_time\"",

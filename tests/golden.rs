@@ -29,7 +29,8 @@ fn portrait(scenario: &Scenario) -> String {
     let summary = run::<NearQueue<NetworkEvent>>(scenario, None, |_| ()).expect("a run without files").summary;
     let question = scenario.question.lines().take_while(|line| !line.is_empty());
     let mut text: String = question.take(1).flat_map(|line| ["# ", line, "\n"]).collect();
-    text += &report::render(&summary, None);
+    // Files are named from here on, wherever this is.
+    text += &report::render(&summary, None).replace(concat!(env!("CARGO_MANIFEST_DIR"), "/"), "");
     text += "\nevents: first and last [ms], how often, an example\n";
     for kind in kinds(&Run::of(scenario).events) {
         let ms = |at: Time| at.since_zero().as_ms();

@@ -189,8 +189,14 @@ fn analyse(run: &Run, master: u8, owners: &BTreeMap<u8, u8>) -> BTreeMap<u8, Ana
             stations.entry(*slave).or_default().exchanges = false;
         }
     };
-    for (.., sender, octets) in &run.telegrams {
+    let mut silent_since = Time::ZERO;
+    for (start, end, sender, octets) in &run.telegrams {
         let sender = sender.get();
+        // No master that lives is silent for longer than the longest T_DP.
+        if *start - silent_since > Span::from_ms(32) {
+            died(&mut stations, sender);
+        }
+        silent_since = *end;
         // The third token was not taken.
         if tokens.times == 3 && sender != tokens.to {
             stations.entry(tokens.to).or_default().lost += 1;

@@ -1,20 +1,25 @@
 //! The tests of the whole, in one binary.
 
 mod acyclic;
+mod budget;
 mod cli;
 mod determinism;
 mod devices;
+mod disturbance_list;
+mod disturbances;
 mod dp_services;
 mod dxb;
 mod encoder;
 mod encoder_scenarios;
 mod episodes;
 mod figures;
+mod flight;
 mod foreign;
 mod golden;
 mod gsd;
 mod interop;
 mod layers;
+mod line;
 mod live_list;
 mod manual;
 mod options;
@@ -31,4 +36,5 @@ mod support;
 mod swarm;
 mod sweep;
 mod topology;
+mod verdicts;
 mod what_if;

@@ -330,7 +330,7 @@ proptest! {
         prop_assert!(findings.iter().all(|found| found.holds() || found.rule.text.contains("repeated")));
         let grid = Span::from_us(125);
         let shorter = Scenario { master: isodp::study::scenario::Master {
-            t_dp: scenario.master.t_dp - grid, ..scenario.master }, ..scenario.clone() };
+            t_dp: scenario.master.t_dp - grid, ..scenario.master.clone() }, ..scenario.clone() };
         let findings = Facts::of(&shorter).findings();
         prop_assert!(broken(&findings).next().is_some(), "{} would do", shorter.master.t_dp);
     }

@@ -61,6 +61,9 @@ fn every_shipped_scenario_has_a_test_and_says_what_it_asks() {
         crate::rates::TESTS,
         crate::gsd::TESTS,
         crate::acyclic::TESTS,
+        crate::disturbances::TESTS,
+        crate::line::TESTS,
+        crate::verdicts::TESTS,
     ];
     let tested = || tables.into_iter().flatten();
     assert_eq!(names, tested().map(|(name, _)| format!("{name}.toml")).collect());

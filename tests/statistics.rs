@@ -90,7 +90,9 @@ fn batches_hold_the_mean_of_values_that_remember() {
     let held = share(400, || {
         let values = remembering(&mut stream, 0.9, 8_000);
         let mut batches = BatchMeans::new();
-        values.iter().for_each(|&value| batches.push(value));
+        for &value in &values {
+            batches.push(value);
+        }
         let mean = batches.interval(Confidence::USUAL).unwrap();
         plain += u32::from(aggregate(&values).mean_interval(Confidence::USUAL).unwrap().holds(0.0));
         flagged += u32::from(mean.correlated);
@@ -108,7 +110,9 @@ fn batches_tell_when_they_are_too_short() {
         let mut stream = draws(test);
         share(500, || {
             let mut batches = BatchMeans::new();
-            remembering(&mut stream, memory, count).into_iter().for_each(|value| batches.push(value));
+            for value in remembering(&mut stream, memory, count) {
+                batches.push(value);
+            }
             batches.interval(Confidence::USUAL).unwrap().correlated
         })
     };
@@ -303,7 +307,9 @@ proptest! {
         let [a, b, c] = [share(&shares[0]), share(&shares[1]), share(&shares[2])];
         let join = |of: [&Keyed<RunKey, Aggregate>; 3]| {
             let mut all = Keyed::default();
-            of.into_iter().for_each(|share| all.merge(share).unwrap());
+            for share in of {
+                all.merge(share).unwrap();
+            }
             all
         };
         let once = join([&a, &b, &c]);

@@ -29,8 +29,8 @@ use isodp::device::sign_of_life::{Counter, Monitor, MonitorSettings};
 use isodp::dp::GLOBAL_CONTROL;
 use isodp::observation::ClockVerdict;
 use isodp::sim::crystal::Crystal;
+use isodp::sim::jitter::JitterSource;
 use isodp::sim::motion::{Resolution, Shaft};
-use isodp::sim::noise::JitterSource;
 use isodp::study::histogram::{Histogram, Quantity};
 use isodp::study::scenario::{self, Scenario};
 use isodp::time::{Local, Span, Time};
@@ -299,7 +299,7 @@ impl<const OCTETS: bool> Straight<OCTETS> {
         Self {
             master,
             crystal: start.station(master).crystal().clone(),
-            jitter: JitterSource::new(scenario.master.gc_jitter, scenario.run.seed, master.get())
+            jitter: JitterSource::new(scenario.master.gc_jitter.clone(), scenario.run.seed, master.get())
                 .expect("a checked jitter"),
             times: Times::of(scenario),
             cycle: 0,
@@ -338,7 +338,7 @@ impl<const OCTETS: bool> Straight<OCTETS> {
     fn cycle(&mut self, witness: &mut impl Witness) {
         let times = self.times;
         let aimed = self.crystal.to_true(self.nominal);
-        let t0 = aimed + self.jitter.draw();
+        let t0 = aimed + self.jitter.draw(aimed, self.cycle);
         if OCTETS {
             self.write_synch(t0, witness);
         }

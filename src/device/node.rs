@@ -7,6 +7,7 @@ use crate::device::tool::Tool;
 use crate::dp::class2::Class2;
 use crate::dp::handler::{Patch, StartupTelegram};
 use crate::dp::master::{Master, Order};
+use crate::fdl::active::HoldToken;
 use crate::fdl::{Filter, Input, Outbox, Station};
 use crate::observation::MasterMode;
 use crate::wire::Address;
@@ -21,6 +22,8 @@ pub enum Command {
     Patch(Address, StartupTelegram, Patch),
     /// Sync, Freeze and their ends, to the master.
     Control(GlobalControl),
+    /// Tokens are kept longer, to any master.
+    HoldToken(HoldToken),
     /// Something for the master's application.
     Application(ControllerCommand),
 }
@@ -69,6 +72,7 @@ impl Station for Node {
                     Command::Mode(mode) => Some(Order::Mode(mode)),
                     Command::Patch(slave, telegram, patch) => Some(Order::Patch(slave, telegram, patch)),
                     Command::Control(control) => Some(Order::Control(control)),
+                    Command::HoldToken(order) => Some(Order::HoldToken(order)),
                     Command::Application(command) => Some(Order::Application(command)),
                 });
                 if let Some(input) = input {
@@ -76,7 +80,11 @@ impl Station for Node {
                 }
             }
             Self::Class2(master) => {
-                if let Some(input) = input.map_command(|_| None) {
+                let input = input.map_command(|command| match command {
+                    Command::HoldToken(order) => Some(order),
+                    _ => None,
+                });
+                if let Some(input) = input {
                     master.step(now, input, out);
                 }
             }

@@ -18,7 +18,7 @@ use alloc::vec::Vec;
 use crate::dp::ms1::{self, Failure, Pdu};
 use crate::dp::ms2::client::{self, Client, Progress};
 use crate::dp::{GET_CFG, RD_INP, RD_OUTP, SLAVE_DIAG};
-use crate::fdl::active::{Active, Confirm, Request};
+use crate::fdl::active::{Active, Confirm, HoldToken, Request};
 use crate::fdl::params::BusParams;
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
 use crate::observation::{AcyclicResult, AcyclicService, ConnectionState, MasterClass, Observation};
@@ -283,8 +283,7 @@ impl<A: Application> Class2<A> {
 }
 
 impl<A: Application> Station for Class2<A> {
-    /// A class 2 master does what it was told before it started.
-    type Command = core::convert::Infallible;
+    type Command = HoldToken;
 
     fn address(&self) -> Address {
         self.settings.address
@@ -305,7 +304,7 @@ impl<A: Application> Station for Class2<A> {
             }
             Input::Deadline { timer: Timer::Schedule, .. } if self.part == Part::Alone => self.visit(now, out),
             Input::Deadline { .. } | Input::Sent | Input::Sample(_) => {}
-            Input::Command(never) => match never {},
+            Input::Command(order) => self.active.hold_token(order),
         }
     }
 }

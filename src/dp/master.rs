@@ -47,7 +47,7 @@ use crate::dp::iso::{CycleClock, Rearm};
 use crate::dp::ms1::{self, Client, Failure, Job, MS1, Progress};
 use crate::dp::supervision::Supervision;
 use crate::dp::{GLOBAL_CONTROL, SLAVE_DIAG};
-use crate::fdl::active::{Active, Confirm, Request};
+use crate::fdl::active::{Active, Confirm, HoldToken, Request};
 use crate::fdl::params::BusParams;
 use crate::fdl::{Filter, Input, Outbox, Station, Timer};
 use crate::observation::{HandlerState, MasterClass, MasterMode, Observation};
@@ -91,6 +91,8 @@ pub enum Order<C> {
     Patch(Address, StartupTelegram, Patch),
     /// Sync, Freeze and their ends, for these groups. Whether it is Clear or Operate, the master adds.
     Control(GlobalControl),
+    /// Tokens are kept longer.
+    HoldToken(HoldToken),
     /// Something for its application.
     Application(C),
 }
@@ -572,6 +574,7 @@ impl<A: Application> Station for Master<A> {
             | Input::Sample(_)
             | Input::Command(Order::Mode(_) | Order::Control(_)) => {}
             Input::Command(Order::Patch(slave, telegram, patch)) => self.patch(slave, telegram, &patch, out),
+            Input::Command(Order::HoldToken(order)) => self.active.hold_token(order),
             Input::Command(Order::Application(command)) => self.app.command(command, out),
         }
     }

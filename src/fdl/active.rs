@@ -19,6 +19,7 @@
 //! | Use_Token | request of the layer above | Await_Data_Response, T_SL armed |
 //! | Use_Token | GAP poll of the layer above | Await_Status_Response, T_SL armed |
 //! | Use_Token | token passed by the layer above | Pass_Token; alone: Use_Token |
+//! | Await_Data_Response, Await_Status_Response | anything but a token or request while the own request has not left | as before |
 //! | Await_Data_Response | answer of the asked station | Use_Token; [`Confirm::Reply`] or [`Confirm::Acknowledged`] |
 //! | Await_Data_Response | anything else, or T_SL over | repeated while retries are left, then Use_Token; [`Confirm::NoReply`] |
 //! | Await_Status_Response | answer, anything else, or T_SL over | Use_Token; [`Confirm::Gap`]; "ready" is the next station |
@@ -143,7 +144,16 @@ pub struct Active {
     free_at: Local,
     /// The last request, for repeating.
     last: Frame,
+    /// Where the last bit of that request leaves: an answer ends later.
+    asked_until: Local,
+    /// How much longer than it has to the station keeps each token.
+    hold: Span,
 }
+
+/// An order of the scenario: from now on the station keeps each token so much longer before it passes it on, as a slow
+/// station does. Zero ends it, and so does the supply.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct HoldToken(pub Span);
 
 impl Active {
     /// A station at `address` on a bus with these parameters.
@@ -162,7 +172,13 @@ impl Active {
             timer: RotationTimer::new(bus.span(bus.t_tr)),
             high_used: false,
             doubted: None,
+            asked_until: Local::ZERO,
+            hold: Span::ZERO,
         }
+    }
+    /// Keeps tokens longer from now on.
+    pub const fn hold_token(&mut self, HoldToken(by): HoldToken) {
+        self.hold = by;
     }
     /// The station's address.
     pub const fn address(&self) -> Address {
@@ -294,10 +310,11 @@ impl Active {
         self.send_last(at, out);
         self.state = State::AwaitDataResponse(Awaited { from: request.to, retries_left, extended: false });
     }
-    fn send_last(&self, at: Local, out: &mut Outbox) {
+    fn send_last(&mut self, at: Local, out: &mut Outbox) {
         let last = &self.last;
         out.send(at, |frame| frame.copy_from(last));
-        out.arm(Timer::Slot, at + self.bus.rate.octets(last.len()) + self.t_sl);
+        self.asked_until = at + self.bus.rate.octets(last.len());
+        out.arm(Timer::Slot, self.asked_until + self.t_sl);
     }
 
     /// Takes a telegram whose last bit arrived at `now`.
@@ -313,14 +330,18 @@ impl Active {
                 self.disputed(now, telegram.as_ref(), out).unwrap_or(Confirm::Nothing)
             }
             State::AwaitDataResponse(awaited) => {
-                let disputed = self.disputed(now, telegram.as_ref(), out);
+                let disputed = self.disputed(now, telegram.as_ref(), out).or(self.is_early(now));
                 disputed.unwrap_or_else(|| self.answered(now, awaited, telegram, out))
             }
             State::AwaitStatusResponse(Awaited { from, .. }) => {
-                let disputed = self.disputed(now, telegram.as_ref(), out);
+                let disputed = self.disputed(now, telegram.as_ref(), out).or(self.is_early(now));
                 disputed.unwrap_or_else(|| self.status(now, from, telegram.as_ref(), out))
             }
         }
+    }
+    /// What is on the line before the request has left answers nothing.
+    fn is_early(&self, now: Local) -> Option<Confirm<'static>> {
+        (now < self.asked_until).then_some(Confirm::Nothing)
     }
     fn answered<'a>(
         &mut self,

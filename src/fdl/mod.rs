@@ -69,7 +69,8 @@ impl<'a, C> Input<'a, C> {
 /// A telegram as it arrived.
 #[derive(Clone, Copy, Debug)]
 pub struct Heard<'a> {
-    /// The characters, start delimiter to end delimiter.
+    /// The characters, start delimiter to end delimiter; none where one of them was broken and the receiver has dropped the
+    /// telegram, so that only something on the line was noticed.
     pub octets: &'a [u8],
     /// Raw position of the shaft (steps) at this instant, if the station has asked for it
     /// ([`Outbox::sample_with_telegrams`]); zero otherwise.

@@ -3,10 +3,29 @@
 //! A telegram reaches a listener after the delay of the path between the two. Where a link on the path has jitter, each
 //! telegram draws once from that link's stream, however many listen: whoever is behind the link hears the same.
 
+use crate::fdl::Route;
+use crate::sim::cut::Cuts;
 use crate::sim::noise::LinkJitter;
+use crate::sim::record::Origin;
 use crate::sim::topology::Delays;
 use crate::time::{Span, Time};
 use crate::wire::Frame;
+
+/// What is to be known of a telegram on the line beside its characters.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Mark {
+    /// How it came onto the line.
+    pub origin: Origin,
+    /// A character of it is broken, so that every receiver drops it and only knows that something was on the line.
+    pub broken: bool,
+    /// The station at whose place it begins has not sent it, and hears it as all others do.
+    pub apart: bool,
+}
+
+impl Mark {
+    /// A good telegram of its sender.
+    pub const OWN: Self = Self { origin: Origin::Sender, broken: false, apart: false };
+}
 
 /// A telegram on the line.
 #[derive(Clone, Debug)]
@@ -23,6 +42,8 @@ pub struct Flight {
     strays: Vec<Span>,
     /// The characters.
     pub frame: Frame,
+    /// What is to be known of it.
+    pub mark: Mark,
     /// Listeners that have not heard its end yet.
     listeners: u16,
 }
@@ -32,7 +53,7 @@ pub struct Flight {
 pub struct FlightId(u16);
 
 /// Telegrams kept for telling whether the line is busy somewhere: more are never near each other.
-const RECENT: usize = 4;
+const RECENT: usize = 8;
 
 /// When a telegram was on the line at its sender.
 #[derive(Clone, Debug)]
@@ -41,6 +62,7 @@ struct Sent {
     end: Time,
     sender: usize,
     strays: Vec<Span>,
+    apart: bool,
 }
 
 /// The bus.
@@ -55,10 +77,11 @@ pub struct Bus {
     sent: u64,
     /// The telegrams sent last, each at the place of its number.
     recent: Vec<Sent>,
-    last: Option<FlightId>,
-    /// End and sender of the telegram that ends last of all.
-    busy_until: Time,
-    busy_by: usize,
+    cuts: Cuts,
+    /// From here on nothing is on the line, and a telegram may begin.
+    clear_from: Time,
+    /// T_SYN.
+    t_syn: Span,
 }
 
 impl Bus {
@@ -71,67 +94,134 @@ impl Bus {
             free: Vec::new(),
             sent: 0,
             recent: Vec::new(),
-            last: None,
-            busy_until: Time::ZERO,
-            busy_by: 0,
+            cuts: Cuts::none(),
+            clear_from: Time::ZERO,
+            t_syn: Span::ZERO,
         }
+    }
+    /// The same whose cables may be cut.
+    #[must_use]
+    pub fn with_cuts(self, cuts: Cuts) -> Self {
+        Self { cuts, ..self }
+    }
+    /// Telegrams kept. Where the line can be in parts, each part needs room for a long telegram beside the short ones of
+    /// the others: 255 characters last as long as 50 tokens with their pauses.
+    const fn kept(&self) -> usize {
+        if self.cuts.is_empty() { RECENT } else { RECENT * 8 }
+    }
+    /// The cable is cut at the place called `name` from now on, or whole again.
+    pub fn cut(&mut self, name: &str, open: bool, now: Time) {
+        let before = self.cuts.open();
+        self.cuts.set(name, open, now);
+        if open {
+            return;
+        }
+        // What is on the line in both parts meets.
+        let Self { flights, recent, cuts, .. } = self;
+        for flight in flights.iter_mut().filter(|flight| flight.listeners > 0 && !flight.frame.is_empty()) {
+            let meets = |sent: &Sent| {
+                let (a, b) = (flight.sender, sent.sender);
+                let both = (flight.start.max(sent.start).max(now), flight.end.min(sent.end));
+                cuts.part_by(before, a, b) && !cuts.part(a, b) && both.0 < both.1
+            };
+            flight.mark.broken |= recent.iter().any(meets);
+        }
+    }
+    /// Whether a telegram that ends at `listener` now has come there whole.
+    #[inline]
+    pub fn reaches(&self, id: FlightId, listener: usize) -> bool {
+        self.cuts.is_empty() || {
+            let flight = self.flight(id);
+            !self.cuts.tear(flight.sender, listener, flight.start)
+        }
+    }
+    /// What the disturbance called `name` adds to the jitter of links counts from now on, or no more.
+    pub fn disturb_link(&mut self, name: &str, on: bool) {
+        self.jitter.iter_mut().for_each(|jitter| jitter.disturb(name, on));
     }
     /// The delays between the stations.
     pub const fn delays(&self) -> &Delays {
         &self.delays
     }
 
-    /// Puts a telegram on the line. Returns its name, and the station it overlaps with, if any.
-    pub fn send(&mut self, sender: usize, (start, end): (Time, Time), frame: &Frame) -> (FlightId, Option<usize>) {
+    /// The same bus with this T_SYN: so long the line has to be idle before a request or a token, or receivers miss it. Stations
+    /// see to it, what comes from nowhere does not.
+    #[must_use]
+    pub const fn with_t_syn(mut self, t_syn: Span) -> Self {
+        self.t_syn = t_syn;
+        self
+    }
+
+    /// Puts a telegram of `sender`, or at its place, on the line. Returns its name, and the station it overlaps with, if any.
+    pub fn send(
+        &mut self,
+        sender: usize,
+        (start, end): (Time, Time),
+        frame: &Frame,
+        mark: Mark,
+    ) -> (FlightId, Option<usize>) {
         let id = self.free.pop().unwrap_or_else(|| {
             let (strays, frame) = (Vec::new(), Frame::new());
-            self.flights.push(Flight { start, end, sender, number: 0, strays, frame, listeners: 0 });
+            let flight = Flight { start, end, sender, number: 0, strays, frame, mark, listeners: 0 };
+            self.flights.push(flight);
             FlightId(self.flights.len() as u16 - 1)
         });
         let flight = &mut self.flights[usize::from(id.0)];
         flight.frame.copy_from(frame);
         (flight.start, flight.end, flight.sender, flight.listeners) = (start, end, sender, 0);
+        flight.mark = mark;
         flight.number = self.sent;
         if !self.jitter.is_empty() {
             flight.strays.clear();
             flight.strays.extend(self.jitter.iter_mut().map(LinkJitter::draw));
         }
+        let hit = if start < self.clear_from { self.collide(id) } else { None };
         self.remember(id);
         self.sent += 1;
-
-        let hit = (start < self.busy_until).then_some(self.busy_by);
-        if hit.is_some() {
-            self.garble(id);
-            if let Some(last) = self.last.filter(|last| !self.free.contains(last)) {
-                self.garble(last);
-            }
-        }
-        if end > self.busy_until {
-            (self.busy_until, self.busy_by) = (end, sender);
-        }
-        self.last = Some(id);
+        self.clear_from = self.clear_from.max(if mark.apart { end + self.t_syn } else { end });
         (id, hit)
+    }
+    /// Overlapping characters fail their parity, and so receivers drop all telegrams that overlap with this one. What is
+    /// apart spoils the idle time before a request too. Returns the sender of one that overlaps, the one that ends last.
+    #[cold]
+    fn collide(&mut self, id: FlightId) -> Option<usize> {
+        let Flight { start, end, sender, mark, ref frame, .. } = self.flights[usize::from(id.0)];
+        let needs_idle = begins_with_idle(frame.octets());
+        let Self { flights, recent, cuts, t_syn, .. } = self;
+        let t_syn = *t_syn;
+        let overlaps =
+            |(from, to): (Time, Time), other: usize| from < to && start < to && from < end && !cuts.part(sender, other);
+        // What listeners wait for, however long ago it was sent.
+        for other in flights.iter_mut().filter(|other| other.listeners > 0 && !other.frame.is_empty()) {
+            let spoilt = mark.apart && begins_with_idle(other.frame.octets());
+            let end = if spoilt { end + t_syn } else { end };
+            other.mark.broken |= start < other.end && other.start < end && !cuts.part(sender, other.sender);
+        }
+        // One that was cut off before it began is as long as nothing.
+        let others = recent.iter().filter(|sent| overlaps((sent.start, sent.end), sent.sender));
+        let hit = others.max_by_key(|sent| sent.end).map(|sent| sent.sender);
+        let spoils = |sent: &Sent| {
+            let too_soon = start >= sent.end && start < sent.end + t_syn;
+            sent.apart && needs_idle && too_soon && !cuts.part(sender, sent.sender)
+        };
+        let broken = hit.is_some() || recent.iter().any(spoils);
+        flights[usize::from(id.0)].mark.broken |= broken;
+        hit
     }
     /// Keeps the telegram for [`Self::is_busy`] instead of the oldest kept.
     fn remember(&mut self, id: FlightId) {
-        let &Flight { start, end, sender, ref strays, .. } = &self.flights[usize::from(id.0)];
-        match self.recent.get_mut(self.sent as usize % RECENT) {
+        let kept = self.kept();
+        let &Flight { start, end, sender, ref strays, mark: Mark { apart, .. }, .. } = &self.flights[usize::from(id.0)];
+        match self.recent.get_mut(self.sent as usize % kept) {
             Some(kept) => {
-                (kept.start, kept.end, kept.sender) = (start, end, sender);
+                (kept.start, kept.end, kept.sender, kept.apart) = (start, end, sender, apart);
                 if !strays.is_empty() {
                     kept.strays.clone_from(strays);
                 }
             }
-            None => self.recent.push(Sent { start, end, sender, strays: strays.clone() }),
+            None => self.recent.push(Sent { start, end, sender, strays: strays.clone(), apart }),
         }
     }
-    /// Overlapping characters fail their parity: the receiver sees a telegram that does not end as it should.
-    fn garble(&mut self, id: FlightId) {
-        if let Some(octet) = self.flights[usize::from(id.0)].frame.octets_mut().last_mut() {
-            *octet ^= 0xFF;
-        }
-    }
-
     /// The station `sender` lost its supply at `now`: what it would have sent later never reaches the line. What is
     /// under way is finished (Model: a telegram that breaks off would be dropped all the same).
     pub fn silence(&mut self, sender: usize, now: Time) {
@@ -143,9 +233,6 @@ impl Bus {
         }
         for sent in self.recent.iter_mut().filter(|sent| coming(sent.sender, sent.start)) {
             sent.end = sent.start;
-            if self.busy_by == sender {
-                self.busy_until = self.busy_until.min(now);
-            }
         }
     }
 
@@ -187,11 +274,18 @@ impl Bus {
     }
     /// Whether the station `listener` sees characters at `now`.
     pub fn is_busy(&self, now: Time, listener: usize) -> bool {
-        self.recent.iter().any(|sent| {
+        self.recent.iter().filter(|sent| !self.cuts.part(sent.sender, listener)).any(|sent| {
             let delay = self.delays.of(sent.sender, listener, &sent.strays);
             sent.start + delay <= now && now < sent.end + delay
         })
     }
+}
+
+/// Whether receivers take this telegram only after an idle line: what the holder of the token sends (EN 50170-2, T_SYN).
+fn begins_with_idle(octets: &[u8]) -> bool {
+    /// SD4.
+    const TOKEN: u8 = 0xDC;
+    octets.first() == Some(&TOKEN) || Route::of(octets).is_some_and(|route| !route.reply)
 }
 
 #[cfg(test)]
@@ -218,47 +312,86 @@ mod tests {
     #[test]
     fn telegrams_that_overlap_are_both_garbled_and_those_that_follow_are_not() {
         let mut bus = line();
-        let (a, clean) = bus.send(0, (ns(0), ns(100)), &token());
+        let (a, clean) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
         bus.add_listeners(a, 1);
-        let (b, hit) = bus.send(1, (ns(99), ns(199)), &token());
+        let (b, hit) = bus.send(1, (ns(99), ns(199)), &token(), Mark::OWN);
         bus.add_listeners(b, 1);
         assert_eq!((clean, hit), (None, Some(0)));
         for id in [a, b] {
-            assert!(bus.flight(id).frame.octets() != token().octets());
+            assert!(bus.flight(id).mark.broken);
             bus.heard(id);
         }
-        let (c, hit) = bus.send(0, (ns(199), ns(299)), &token());
-        assert_eq!((hit, bus.flight(c).frame.octets()), (None, token().octets()));
+        let (c, hit) = bus.send(0, (ns(199), ns(299)), &token(), Mark::OWN);
+        assert_eq!((hit, bus.flight(c).mark.broken), (None, false));
+    }
+
+    #[test]
+    fn a_telegram_that_is_hit_twice_is_as_broken_and_one_that_fits_before_another_is_not_hit() {
+        let mut bus = line();
+        let mut put = |sender, from, to| {
+            let (id, hit) = bus.send(sender, (ns(from), ns(to)), &token(), Mark::OWN);
+            bus.add_listeners(id, 1);
+            (id, hit)
+        };
+        let sent = [put(0, 0, 100), put(1, 50, 150), put(0, 120, 220), put(1, 1_000, 1_100), put(0, 500, 1_000)];
+        assert_eq!(sent.map(|(_, hit)| hit), [None, Some(0), Some(1), None, None]);
+        let long = put(0, 900, 2_000);
+        assert_eq!(long.1, Some(1));
+        let all = sent.map(|(id, _)| bus.flight(id).mark.broken);
+        assert_eq!(all, [true, true, true, true, true], "the last two by the long one");
+    }
+
+    #[test]
+    fn what_comes_from_nowhere_spoils_the_idle_time_before_a_request() {
+        let mut bus = line().with_t_syn(ns(100) - ns(0));
+        let noise = Mark { origin: Origin::Disturbance(0), broken: true, apart: true };
+        let mut answer = Frame::new();
+        answer.set_short_ack();
+        let mut put = |from, to, frame: &Frame, mark| {
+            let (id, hit) = bus.send(0, (ns(from), ns(to)), frame, mark);
+            bus.add_listeners(id, 1);
+            assert_eq!(hit, None);
+            id
+        };
+        let mut at = |begin, frame: &Frame| {
+            // The telegram may have been planned before the noise, or may come afterwards.
+            let planned = put(begin + 50, begin + 60, frame, Mark::OWN);
+            put(begin, begin + 10, &token(), noise);
+            (planned, put(begin + 109, begin + 119, frame, Mark::OWN), put(begin + 219, begin + 229, frame, Mark::OWN))
+        };
+        let (tokens, answers) = (at(0, &token()), at(1_000, &answer));
+        let broken = |(a, b, c): (FlightId, FlightId, FlightId)| [a, b, c].map(|id| bus.flight(id).mark.broken);
+        assert_eq!((broken(tokens), broken(answers)), ([true, true, false], [false; 3]));
     }
 
     #[test]
     fn what_a_station_without_supply_had_planned_never_comes() {
         let mut bus = line();
-        let (running, _) = bus.send(0, (ns(0), ns(100)), &token());
+        let (running, _) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
         bus.add_listeners(running, 1);
         bus.silence(0, ns(50));
         assert_eq!(bus.flight(running).frame.octets(), token().octets(), "under way, it is finished");
         bus.heard(running);
-        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token());
+        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token(), Mark::OWN);
         bus.add_listeners(planned, 1);
         bus.silence(1, ns(300));
         assert!(!bus.flight(planned).frame.is_empty(), "another station's supply");
         bus.silence(0, ns(300));
         assert!(bus.flight(planned).frame.is_empty());
         assert!(!bus.is_busy(ns(550), 0), "the line stays free");
-        let (_, hit) = bus.send(1, (ns(550), ns(650)), &token());
+        let (_, hit) = bus.send(1, (ns(550), ns(650)), &token(), Mark::OWN);
         assert_eq!(hit, None);
     }
 
     #[test]
     fn a_receiver_sees_the_line_busy_one_delay_later() {
         let mut bus = line();
-        let (id, _) = bus.send(0, (ns(100), ns(200)), &token());
+        let (id, _) = bus.send(0, (ns(100), ns(200)), &token(), Mark::OWN);
         assert_eq!([149, 150, 249, 250].map(|t| bus.is_busy(ns(t), 1)), [false, true, true, false]);
         assert_eq!((bus.arrival(id, 0), bus.arrival(id, 1)), ((ns(200), 0), (ns(250), 0)));
         // Forgotten when as many as are kept have followed.
         for _ in 0..RECENT {
-            bus.send(1, (ns(1_000), ns(1_100)), &token());
+            bus.send(1, (ns(1_000), ns(1_100)), &token(), Mark::OWN);
         }
         assert!(!bus.is_busy(ns(150), 1) && bus.is_busy(ns(1_050), 1) && bus.is_busy(ns(1_149), 0));
     }
@@ -274,7 +407,7 @@ mod tests {
         let mut strays = Vec::new();
         for sender in [0, 1, 2].into_iter().cycle().take(300) {
             let start = ns(strays.len() as i64 * 1_000);
-            let (id, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token());
+            let (id, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token(), Mark::OWN);
             let delay = |listener| bus.arrival(id, listener).0 - bus.flight(id).end;
             let stray = expected.draw();
             let behind = Span::from_ns(100) + stray;

@@ -36,6 +36,8 @@ pub struct Crystal {
     rate: i64,
     /// True ticks in one local tick [2^-62], rounded down.
     inverse: i64,
+    /// How fast it is [parts per billion].
+    ppb: i64,
 }
 
 impl Crystal {
@@ -48,7 +50,7 @@ impl Crystal {
     /// [`CrystalError::Offset`] if `ppb` is outside of ±[`Self::MAX_PPB`].
     pub fn new(ppb: i64, start: Local) -> Result<Self, CrystalError> {
         let (rate, inverse) = rates(ppb)?;
-        Ok(Self { since: Time::ZERO, reading: start, fraction: 0, rate, inverse })
+        Ok(Self { since: Time::ZERO, reading: start, fraction: 0, rate, inverse, ppb })
     }
 
     /// Goes on at `ppb` [parts per billion] from `at`, without a step in the reading.
@@ -67,8 +69,13 @@ impl Crystal {
         let exact = self.elapsed(at);
         self.reading = self.after(exact >> FRACTION);
         self.fraction = (exact & FRACTION_MASK) as i64;
-        (self.since, self.rate, self.inverse) = (at, rate, inverse);
+        (self.since, self.rate, self.inverse, self.ppb) = (at, rate, inverse, ppb);
         Ok(())
+    }
+
+    /// How fast it is now [parts per billion].
+    pub const fn ppb(&self) -> i64 {
+        self.ppb
     }
 
     /// What the crystal shows at `time`: the exact value rounded down.

@@ -10,7 +10,7 @@ use std::hash::Hasher;
 use twox_hash::XxHash64;
 
 use super::record::{Recorder, Stamp, Transmission};
-use crate::observation::Observation;
+use crate::observation::{Disturbance, Observation};
 use crate::time::Time;
 use crate::wire::Address;
 
@@ -145,7 +145,9 @@ impl Recorder for Fingerprints {
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         match what {
             Observation::CycleStart { cycle, .. } if stamp.station == self.master => self.checkpoint(*cycle),
-            Observation::CycleStart { .. } => {}
+            // What was done to a station shows in what it did.
+            Observation::CycleStart { .. }
+            | Observation::Disturbed { how: Disturbance::Begins | Disturbance::Ends, .. } => {}
             Observation::Latch { locked, inputs } => {
                 let latches = &mut self.station(stamp.station).latches;
                 latches.instant(stamp.at);

@@ -5,11 +5,14 @@
 
 pub mod bus;
 pub mod crystal;
+pub mod cut;
 pub mod fault;
 pub mod fingerprint;
+pub mod jitter;
 pub mod motion;
 pub mod network;
 pub mod noise;
 pub mod queue;
 pub mod record;
+pub mod share;
 pub mod topology;

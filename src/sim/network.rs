@@ -4,18 +4,28 @@
 //! number on the line, a station's other events are numbered by this station alone. Only the order of numbers matters,
 //! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
+mod disturbed;
+mod source;
+mod tune;
+mod turn;
+
+use crate::fdl::params::BusParams;
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
-use crate::observation::{self, Observation};
-use crate::sim::bus::{Bus, FlightId};
+use crate::observation::Observation;
+use crate::sim::bus::{Bus, Flight, FlightId, Mark};
 use crate::sim::crystal::Crystal;
+use crate::sim::cut::Cuts;
 use crate::sim::fault::Faults;
+use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{Resolution, Shaft};
-use crate::sim::noise::{JitterSource, LinkJitter};
+use crate::sim::noise::LinkJitter;
 use crate::sim::queue::{Key, NearQueue, Phase, Queue};
-use crate::sim::record::{Origin, Recorder, Stamp, Transmission};
+use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
-use crate::wire::Address;
+use crate::wire::{Address, Frame};
+use disturbed::Held;
+use turn::Turning;
 
 mod alter;
 
@@ -41,17 +51,20 @@ pub struct Wiring {
     pub tree: Tree,
     /// The links with jitter, by index, and what each draws.
     pub jitter: Vec<(usize, LinkJitter)>,
+    /// Where cables may be cut, each place with the name of the disturbance that does it.
+    pub cuts: Vec<(String, Place)>,
 }
 
 impl Wiring {
     /// One segment of cable.
     pub fn line() -> Self {
-        Self { tree: Tree::line(), jitter: Vec::new() }
+        Self { tree: Tree::line(), jitter: Vec::new(), cuts: Vec::new() }
     }
     /// The bus of stations at `places`.
     fn bus(self, places: &[Place]) -> Bus {
         let (unsteady, jitter): (Vec<_>, Vec<_>) = self.jitter.into_iter().unzip();
-        Bus::new(Delays::new(&self.tree, places, &unsteady), jitter)
+        let cuts = Cuts::new(self.cuts, &self.tree, places);
+        Bus::new(Delays::new(&self.tree, places, &unsteady), jitter).with_cuts(cuts)
     }
 }
 
@@ -101,6 +114,33 @@ enum Event {
     Broadcast(FlightId, u8),
     Sent,
     Deadline(u8),
+    /// A telegram that a disturbance has held up, or made, leaves.
+    Held(u16),
+    /// A disturbance of this number among those that turn does so.
+    Turn(u16),
+    /// A disturbance of this number among those that turn changes rates of crystals.
+    Step(u16),
+    /// A disturbance of this number among those that turn puts something on the line.
+    Source(u16),
+}
+
+/// What a station's supply depends on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Supply {
+    /// Its switch is on.
+    switched_on: bool,
+    /// Disturbances that keep it off.
+    outages: u16,
+}
+
+/// How fast a station's crystal should be (parts per billion).
+#[derive(Clone, Copy, Debug)]
+struct Offset {
+    own: i64,
+    /// What disturbances add.
+    pulled: i64,
+    /// It is not in force yet.
+    waits: bool,
 }
 
 #[derive(Clone)]
@@ -109,6 +149,8 @@ struct Slot<S> {
     address: Address,
     filter: Filter,
     powered: bool,
+    supply: Supply,
+    offset: Offset,
     /// When its next cycle begins, once that is known.
     cycle_at: Option<Time>,
     sample_with_telegrams: bool,
@@ -132,12 +174,18 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     queue: Q,
     jitter: JitterSource,
     faults: Faults,
+    held: Held,
+    /// Room for what comes onto the line from nowhere.
+    foreign: Frame,
     acts: Vec<(usize, Act<S::Command>)>,
     /// Which of them do not count any more.
     cancelled: core::ops::Range<usize>,
     /// Acts bound to cycles, by cycle.
     cycle_acts: Vec<(u64, usize)>,
     next_cycle_act: usize,
+    /// Disturbances that begin and end, and the first cycle in which one of them does.
+    turning: Vec<Turning<S::Command>>,
+    next_turn: u64,
     now: Time,
     /// Cycles that the first station has begun, with a lost SYNCH too.
     clocks: u64,
@@ -157,7 +205,12 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     ///
     /// # Panics
     /// If two stations have one address, or there are more than 127: the caller checks scenarios.
-    pub fn new(rate: BitRate, (wiring, sites): (Wiring, Vec<Site<S>>), jitter: JitterSource, faults: Faults) -> Self {
+    pub fn new(
+        rate: BitRate,
+        (wiring, sites): (Wiring, Vec<Site<S>>),
+        jitter: JitterSource,
+        mut faults: Faults,
+    ) -> Self {
         let places: Vec<_> = sites.iter().map(|site| site.place).collect();
         let mut by_address = [None; 128];
         let mut slots = Vec::with_capacity(sites.len());
@@ -166,32 +219,39 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let place = &mut by_address[usize::from(address.get())];
             assert!(place.is_none(), "two stations with address {address}");
             *place = Some(index as u8);
-            let filter = site.machine.filter();
+            let (filter, own) = (site.machine.filter(), site.crystal.ppb());
             slots.push(Slot {
                 site,
                 address,
                 filter,
                 powered: false,
+                supply: Supply::default(),
+                offset: Offset { own, pulled: 0, waits: false },
                 cycle_at: None,
                 sample_with_telegrams: false,
                 deadlines: [Deadline::default(); Outbox::DEADLINES],
                 number: 0,
             });
         }
+        let turning = faults.take_turning();
         let mut network = Self {
             rate,
             slots,
             by_address,
             curious: Vec::new(),
             neighbours: Vec::new(),
-            bus: wiring.bus(&places),
+            bus: wiring.bus(&places).with_t_syn(rate.span(BusParams::T_SYN)),
             queue: Q::default(),
             jitter,
             faults,
+            held: Held::default(),
+            foreign: Frame::new(),
             acts: Vec::new(),
             cancelled: 0..0,
             cycle_acts: Vec::new(),
             next_cycle_act: 0,
+            turning: Vec::new(),
+            next_turn: u64::MAX,
             now: Time::ZERO,
             clocks: 0,
             out: Outbox::new(),
@@ -202,6 +262,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let (address, at) = (network.slots[index].address, network.slots[index].site.powered_at);
             network.order(When::Time(at), address, Act::PowerOn);
         }
+        network.disturb(turning);
         network
     }
 
@@ -265,6 +326,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
             Event::Sent => self.sent(slot, recorder),
             Event::Deadline(which) => self.deadline(slot, usize::from(which), recorder),
+            Event::Held(which) => self.release(slot, usize::from(which), recorder),
+            Event::Turn(number) => self.turn(number.into(), recorder),
+            Event::Step(number) => self.step_crystals(number.into()),
+            Event::Source(number) => self.emit(number.into(), recorder),
         }
         true
     }
@@ -272,24 +337,44 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     fn act<R: Recorder>(&mut self, act: usize, recorder: &mut R) {
         let (slot, act) = self.acts[act];
         match act {
-            Act::PowerOn if !self.slots[slot].powered => {
-                self.slots[slot].powered = true;
-                self.tell(slot, &Observation::Power { on: true }, recorder);
-                self.step(slot, self.local(slot), Input::PowerOn, recorder);
-            }
-            Act::PowerOn => {}
-            Act::PowerOff => {
-                self.tell(slot, &Observation::Power { on: false }, recorder);
-                let (index, slot) = (slot, &mut self.slots[slot]);
-                slot.powered = false;
-                slot.cycle_at = None;
-                for deadline in &mut slot.deadlines {
-                    deadline.due = None;
-                }
-                self.bus.silence(index, self.now);
-            }
-            Act::Command(command) => self.step(slot, self.local(slot), Input::Command(command), recorder),
+            Act::PowerOn => self.switch(slot, true, recorder),
+            Act::PowerOff => self.switch(slot, false, recorder),
+            Act::Command(command) => self.command(slot, command, recorder),
         }
+    }
+    fn command<R: Recorder>(&mut self, slot: usize, command: S::Command, recorder: &mut R) {
+        if self.slots[slot].powered {
+            self.step(slot, self.local(slot), Input::Command(command), recorder);
+        } else {
+            self.tell(slot, &Observation::OrderLost, recorder);
+        }
+    }
+    fn switch<R: Recorder>(&mut self, slot: usize, on: bool, recorder: &mut R) {
+        self.slots[slot].supply.switched_on = on;
+        self.update_supply(slot, recorder);
+    }
+    /// Brings a station's supply to what its switch and the disturbances make of it.
+    fn update_supply<R: Recorder>(&mut self, index: usize, recorder: &mut R) {
+        let slot = &mut self.slots[index];
+        let on = slot.supply.switched_on && slot.supply.outages == 0;
+        if on == slot.powered {
+            return;
+        }
+        slot.powered = on;
+        if on {
+            self.tell(index, &Observation::Power { on }, recorder);
+            return self.step(index, self.local(index), Input::PowerOn, recorder);
+        }
+        slot.cycle_at = None;
+        for deadline in &mut slot.deadlines {
+            deadline.due = None;
+        }
+        if slot.offset.waits {
+            self.tune(index);
+        }
+        self.bus.silence(index, self.now);
+        recorder.withdrawn(self.slots[index].address, self.now);
+        self.tell(index, &Observation::Power { on }, recorder);
     }
     /// Tells what happened to a station and was not its own doing.
     fn tell<R: Recorder>(&self, slot: usize, what: &Observation, recorder: &mut R) {
@@ -305,9 +390,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let sample = if station.sample_with_telegrams { self.raw(slot) } else { 0 };
         let now = self.local(slot);
         // Without octets it was cut off before it began.
-        if station.powered && !self.bus.flight(id).frame.is_empty() {
+        if station.powered && !self.bus.flight(id).frame.is_empty() && self.hears(slot, id) {
             self.out.clear();
-            let octets = self.bus.flight(id).frame.octets();
+            let flight = self.bus.flight(id);
+            let octets = if flight.mark.broken { &[] } else { flight.frame.octets() };
             let input = Input::Telegram(Heard { octets, sample });
             self.slots[slot].site.machine.step(now, input, &mut self.out);
             self.bus.heard(id);
@@ -315,6 +401,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         } else {
             self.bus.heard(id);
         }
+    }
+    /// Whether a telegram comes to a station's ears.
+    fn hears(&self, slot: usize, id: FlightId) -> bool {
+        self.bus.reaches(id, slot) && !self.is_deaf(slot)
+    }
+    /// Whether a disturbance keeps a station from hearing.
+    fn is_deaf(&self, slot: usize) -> bool {
+        self.faults.deafens(self.slots[slot].address, (self.now, self.clocks_begun(false)))
     }
     /// The shaft's raw position now (steps); zero without a shaft.
     fn raw(&self, slot: usize) -> u32 {
@@ -326,11 +420,17 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         if self.slots[slot].cycle_at.take_if(|at| *at == self.now).is_none() {
             return; // It lost its supply before.
         }
+        if self.slots[slot].offset.waits {
+            self.tune(slot);
+        }
         if slot != Self::CLOCK {
             return self.step(slot, self.local(slot), Input::Sent, recorder);
         }
         let cycle = self.clocks;
         self.clocks += 1;
+        if cycle >= self.next_turn {
+            self.turn_in_cycle(cycle, recorder);
+        }
         while let Some(&(_, act)) = self.cycle_acts.get(self.next_cycle_act).filter(|&&(due, _)| due <= cycle) {
             self.next_cycle_act += 1;
             self.act(act, recorder);
@@ -352,10 +452,15 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         deadline.due = None;
         let input = match Timer::ALL.get(which) {
-            Some(&timer) => Input::Deadline { timer, busy: timer == Timer::Slot && self.bus.is_busy(now, slot) },
+            Some(&timer) => Input::Deadline { timer, busy: timer == Timer::Slot && self.is_busy(slot) },
             None => Input::Sample(self.raw(slot)),
         };
         self.step(slot, local, input, recorder);
+    }
+
+    /// Whether a station sees characters on the line.
+    fn is_busy(&self, slot: usize) -> bool {
+        self.bus.is_busy(self.now, slot) && !self.is_deaf(slot)
     }
 
     fn step<R: Recorder>(&mut self, slot: usize, now: Local, input: Input<'_, S::Command>, recorder: &mut R) {
@@ -419,29 +524,38 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Puts the telegram in the outbox, if there is one, onto the line.
     fn transmit<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
         let Some((send, frame)) = self.out.sending() else { return };
-        let Slot { site, address, .. } = &self.slots[slot];
-        let address = *address;
+        let &Slot { ref site, address, .. } = &self.slots[slot];
         let mut start = site.crystal.to_true(send.at);
         let mut end = site.crystal.to_true(send.at + self.rate.octets(frame.len()));
         if send.clock {
-            let jitter = self.jitter.draw().max(self.now - start);
+            let jitter = self.jitter.draw(start, self.clocks) + self.faults.clock_strays(start, self.clocks);
+            let jitter = jitter.max(self.now - start);
             start += jitter;
             end += jitter;
+        } else {
+            let delay = self.faults.answer_delay(address, (start, self.clocks_begun(false)));
+            start += delay;
+            end += delay;
         }
-        let running = (start, self.clocks_begun(send.clock));
-        let lost = self.faults.loses(running, address, send.clock, frame.octets());
         if send.clock {
             // The master's transmitter runs, whatever becomes of the telegram.
             self.begin_cycle(slot, end);
         }
-        if let Some(number) = lost {
-            let how = observation::Disturbance::Lost;
-            return self.tell(slot, &Observation::Disturbed { number, how }, recorder);
+        if !self.faults.line.is_idle() {
+            return self.transmit_disturbed(slot, (start, end), send.clock, recorder);
+        }
+        if self.faults.mutes(address, (start, self.clocks_begun(send.clock))) {
+            return;
         }
         let Some((_, frame)) = self.out.sending() else { return };
-        let (octets, origin) = (frame.octets(), Origin::Sender);
-        recorder.telegram(&Transmission { start, end, sender: address, octets, origin });
-        let (id, hit) = self.bus.send(slot, (start, end), frame);
+        let flight = self.bus.send(slot, (start, end), frame, Mark::OWN);
+        self.sent_off(slot, flight, recorder);
+    }
+    /// Tells that a telegram is on the line, and its listeners when its end will reach them.
+    fn sent_off<R: Recorder>(&mut self, slot: usize, (id, hit): (FlightId, Option<usize>), recorder: &mut R) {
+        let sender = self.slots[slot].address;
+        let Flight { start, end, mark, ref frame, .. } = *self.bus.flight(id);
+        recorder.telegram(&Transmission { start, end, sender, octets: frame.octets(), origin: mark.origin });
         if let Some(with) = hit {
             self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
         }
@@ -471,7 +585,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
     }
     fn deliver_to(&mut self, listener: usize, sender: usize, id: FlightId, route: Option<Route>) -> bool {
-        if listener == sender || !self.slots[listener].filter.passes(route) {
+        if listener == sender && !self.bus.flight(id).mark.apart || !self.slots[listener].filter.passes(route) {
             return false;
         }
         self.bus.add_listeners(id, 1);
@@ -480,14 +594,19 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// A request for all passes every filter. Only the nearest neighbour is told now and tells the next one when it has
     /// heard, so that the queue holds one event of the telegram, not one for each station. Where links have jitter, who
-    /// is nearest differs from telegram to telegram, and all are told now.
+    /// is nearest differs from telegram to telegram, and all are told now; so where receivers have.
     fn broadcast(&mut self, sender: usize, id: FlightId) {
+        if self.bus.flight(id).mark.apart {
+            self.bus.add_listeners(id, 1);
+            self.push_telegram(sender, id, Event::Telegram(id));
+        }
         let count = self.neighbours[sender].len();
         match count {
+            0 if self.bus.flight(id).mark.apart => return,
             0 => return self.bus.unheard(id),
             count => self.bus.add_listeners(id, count as u16),
         }
-        if self.bus.delays().is_steady() {
+        if self.bus.delays().is_steady() && !self.faults.strays_arrivals() {
             return self.tell_neighbour(id, 0);
         }
         for rank in 0..count {
@@ -502,7 +621,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// The telegram's end reaches `listener`. Of telegrams that end there at one instant the one sent first comes first.
     fn push_telegram(&mut self, listener: usize, id: FlightId, event: Event) {
-        let (at, number) = self.bus.arrival(id, listener);
+        let (mut at, number) = self.bus.arrival(id, listener);
+        if self.faults.strays_arrivals() {
+            let running = (self.bus.flight(id).start, self.clocks_begun(false));
+            at += self.faults.capture_stray(self.slots[listener].address, running);
+            // Nobody hears what has not been said.
+            at = at.max(self.bus.flight(id).end).max(self.now);
+        }
         let key = Key::new(at, Phase::Telegram, self.slots[listener].address.get(), number);
         self.queue.push(key, NetworkEvent(event));
     }

@@ -44,10 +44,14 @@ pub struct Stamp<'a> {
 /// Reads a run while it happens.
 pub trait Recorder {
     /// A telegram will be on the line. Comes when its sender decides so, at or before its first bit; telegrams that do
-    /// not overlap come in the order of their starts.
+    /// not overlap come in the order of their starts. What a disturbance has held up or made comes with its first bit, when
+    /// a telegram that begins a little later may have come already.
     fn telegram(&mut self, telegram: &Transmission<'_>);
     /// A station observed something.
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation);
+    /// The station `sender` lost its supply at `now`: what was told of its telegrams that would begin later never
+    /// reaches the line. Who keeps telegrams drops them.
+    fn withdrawn(&mut self, _sender: Address, _now: Time) {}
 }
 
 impl Recorder for () {
@@ -64,6 +68,10 @@ impl<A: Recorder, B: Recorder> Recorder for (A, B) {
         self.0.observe(stamp, what);
         self.1.observe(stamp, what);
     }
+    fn withdrawn(&mut self, sender: Address, now: Time) {
+        self.0.withdrawn(sender, now);
+        self.1.withdrawn(sender, now);
+    }
 }
 
 impl<R: Recorder> Recorder for Option<R> {
@@ -77,6 +85,11 @@ impl<R: Recorder> Recorder for Option<R> {
             recorder.observe(stamp, what);
         }
     }
+    fn withdrawn(&mut self, sender: Address, now: Time) {
+        if let Some(recorder) = self {
+            recorder.withdrawn(sender, now);
+        }
+    }
 }
 
 impl<R: Recorder> Recorder for &mut R {
@@ -85,5 +98,8 @@ impl<R: Recorder> Recorder for &mut R {
     }
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         (**self).observe(stamp, what);
+    }
+    fn withdrawn(&mut self, sender: Address, now: Time) {
+        (**self).withdrawn(sender, now);
     }
 }

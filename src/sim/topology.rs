@@ -146,6 +146,13 @@ impl Tree {
         }
         delay + at.delay(to)
     }
+    /// Whether `place` lies behind `cut`: the path from the beginning of the cut's segment to it leads through the cut.
+    pub fn is_behind(&self, cut: Place, place: Place) -> bool {
+        // Where the path from there comes onto the segment.
+        let onto = self.path(place.segment, cut.segment).last();
+        let at = onto.map_or(place, |(link, near)| self.links[link].ends[1 - near]);
+        at.along >= cut.along
+    }
 }
 
 /// Links in a set, by index.

@@ -10,16 +10,19 @@ use crate::device::tool::{self, Tool};
 use crate::device::unit::{self, UnitSettings};
 use crate::dp::CLOCK_GROUP;
 use crate::dp::class2::{self, Class2};
-use crate::dp::handler::SlaveParams;
+use crate::dp::handler::{Patch, SlaveParams, StartupTelegram};
 use crate::dp::iso::Rearm;
 use crate::dp::master::{Master, Pace, Settings};
 use crate::dp::ms2::{self, client};
+use crate::fdl::active::HoldToken;
 use crate::observation::MasterMode;
 use crate::sim::crystal::Crystal;
-use crate::sim::fault::Faults;
+use crate::sim::fault::order::OrderFault;
+use crate::sim::fault::{Faults, What};
+use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{self, Shaft};
 use crate::sim::network::{self, Act, Network, NetworkEvent, Site, Wiring};
-use crate::sim::noise::{JitterSource, LinkJitter, Purpose, Stream};
+use crate::sim::noise::{LinkJitter, Purpose, Stream};
 use crate::sim::queue::Queue;
 use crate::sim::topology::Place;
 use crate::study::plan::{self, Plan};
@@ -169,7 +172,7 @@ pub fn slave_params(scenario: &Scenario, slave: &Slave) -> SlaveParams {
 /// If the scenario breaks a rule that reading it checks.
 pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> {
     let seed = scenario.run.seed;
-    let master = scenario.master;
+    let master = &scenario.master;
     let mut sites = vec![Site {
         machine: Node::Master(master_of(scenario)),
         place: place(scenario, master.address),
@@ -186,11 +189,17 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     }));
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
-    let jitter = JitterSource::new(master.gc_jitter, seed, master.address.get()).expect("a checked jitter");
-    let mut network =
-        Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, Faults::new(&scenario.disturbances));
+    let jitter = JitterSource::new(master.gc_jitter.clone(), seed, master.address.get()).expect("a checked jitter");
+    let mut network = Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, faults(scenario));
+    order_disturbances(&mut network, scenario);
     order(&mut network, scenario, &scenario.events);
     network
+}
+
+/// The disturbances of a scenario at work, with the draws of its seed for each of its stations.
+pub fn faults(scenario: &Scenario) -> Faults {
+    let stations: Vec<_> = scenario.stations().map(|station| station.address).collect();
+    Faults::new(&scenario.disturbances, scenario.run.seed, &stations)
 }
 
 /// Gives `network` the orders of `events`, which are events of `scenario`.
@@ -206,12 +215,58 @@ pub fn order<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &
     }
 }
 
+/// Tells `network` what the disturbances of `scenario` order of masters.
+pub fn order_disturbances<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, scenario: &Scenario) {
+    for (number, disturbance) in scenario.disturbances.iter().enumerate() {
+        if let What::Order(stations, fault) = &disturbance.what {
+            let [begin, end] = order_bursts(scenario, stations, *fault);
+            network.order_bursts(number as u16, &begin, &end);
+        }
+    }
+}
+
+/// What a disturbance orders of these masters, or of the masters of these slaves, at the beginning and at the end of a burst.
+fn order_bursts(scenario: &Scenario, slaves: &[Address], fault: OrderFault) -> [Vec<(Address, Command)>; 2] {
+    let owner = |slave| scenario.slave(slave).map_or(scenario.master.address, |slave| slave.master);
+    let all = |order: &dyn Fn(Address) -> Command| slaves.iter().map(|&slave| (owner(slave), order(slave))).collect();
+    let life = |order: &dyn Fn(Address) -> controller::Command| all(&|slave| Command::Application(order(slave)));
+    let t_mapc = u32::from(scenario.master.t_mapc);
+    match fault {
+        OrderFault::HoldLife => {
+            [life(&|slave| controller::Command::HoldLife(slave, None)), life(&controller::Command::ReleaseLife)]
+        }
+        OrderFault::JumpLife(to) => [life(&|slave| controller::Command::JumpLife(slave, to)), Vec::new()],
+        OrderFault::RepeatLife => [life(&|slave| controller::Command::HoldLife(slave, Some(t_mapc))), Vec::new()],
+        OrderFault::HoldToken(by) => {
+            let hold = |by| slaves.iter().map(|&master| (master, Command::HoldToken(HoldToken(by)))).collect();
+            [hold(by), hold(Span::ZERO)]
+        }
+        OrderFault::WrongPrm(patch) => {
+            let prm = |patch| move |slave| Command::Patch(slave, StartupTelegram::Prm, patch);
+            [all(&prm(patch)), all(&prm(Patch::default()))]
+        }
+    }
+}
+
 /// The cables; every repeater with jitter has its own draws, by its name.
 fn wiring(scenario: &Scenario) -> Wiring {
-    let repeaters = scenario.topology.repeaters().iter().enumerate();
-    let jitter = repeaters.filter(|(_, repeater)| repeater.jitter > Span::ZERO);
-    let jitter = jitter.map(|(i, repeater)| (i, LinkJitter::new(repeater.jitter, scenario.run.seed, &repeater.name)));
-    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect() }
+    let seed = scenario.run.seed;
+    let jitter = scenario.topology.repeaters().iter().enumerate().filter_map(|(index, repeater)| {
+        let more = scenario.disturbances.iter().filter_map(|disturbance| match disturbance.what {
+            What::Repeater(at, half_width) if at == index => Some((disturbance, half_width)),
+            _ => None,
+        });
+        let own = LinkJitter::new(repeater.jitter, seed, &repeater.name);
+        let mut more = more.peekable();
+        let strays = repeater.jitter > Span::ZERO || more.peek().is_some();
+        let jitter = more.fold(own, |jitter, (disturbance, width)| jitter.with(width, seed, &disturbance.name));
+        strays.then_some((index, jitter))
+    });
+    let cuts = scenario.disturbances.iter().filter_map(|disturbance| match disturbance.what {
+        What::Cut(place) => Some((disturbance.name.clone(), place)),
+        _ => None,
+    });
+    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect(), cuts: cuts.collect() }
 }
 
 /// Where a station is.

@@ -6,7 +6,7 @@ use super::acyclic::AcyclicCounts;
 use super::layout::Layout;
 use super::live_list::{CycleTimes, LiveList};
 use super::masters::MasterCounts;
-use crate::observation::{ClockVerdict, Leds, LinkState, Observation, Phase, PllState, SlaveState};
+use crate::observation::{ClockVerdict, Disturbance, Leds, LinkState, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -263,6 +263,7 @@ impl Counts {
         }
         match what {
             Observation::Collision { .. } => self.network.collisions += 1,
+            Observation::Disturbed { how: Disturbance::Begins | Disturbance::Ends, .. } => {}
             Observation::Disturbed { .. } => self.network.disturbed += 1,
             Observation::MasterMode { from, to } if from != to => {
                 self.network.last_mode = Some(Moment::new(at, self.network.cycles));

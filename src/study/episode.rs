@@ -34,7 +34,7 @@ use super::layout::Layout;
 use super::report::{aligned, ranges};
 use super::row::{EventRow, Sink, SlaveRow};
 use super::summary::Distribution;
-use crate::observation::{Observation, Phase, PllState, SlaveState};
+use crate::observation::{Disturbance, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
 
@@ -88,6 +88,10 @@ impl Trouble {
     pub fn of(station: Address, is_slave: bool, what: &Observation) -> Option<Self> {
         let lasting = |on: bool| if on { Edge::Begins } else { Edge::Ends };
         match *what {
+            Observation::Disturbed { how: how @ (Disturbance::Begins | Disturbance::Ends), .. } => {
+                let edge = lasting(how == Disturbance::Begins);
+                Some(Self { slave: is_slave.then_some(station), edge })
+            }
             Observation::Disturbed { .. } => Some(Self { slave: None, edge: Edge::Moment }),
             // Without its master nobody operates.
             Observation::Power { on } => Some(Self { slave: is_slave.then_some(station), edge: lasting(!on) }),
@@ -538,7 +542,7 @@ impl Serialize for Spread {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observation::{Disturbance, SlaveCause};
+    use crate::observation::SlaveCause;
     use crate::study::layout::SlaveLayout;
     use crate::study::sample::address;
 

@@ -2,6 +2,8 @@
 //! threads and reports.
 
 pub mod acyclic;
+pub mod batch;
+pub mod budget;
 pub mod build;
 pub mod count;
 pub mod devices;
@@ -10,8 +12,11 @@ pub mod episode;
 pub mod event_budget;
 pub mod export;
 pub mod figure;
+pub mod first_fault;
+pub mod flight;
 pub mod gsd;
 pub mod histogram;
+pub mod invocation;
 pub mod layout;
 pub mod live_list;
 pub mod masters;
@@ -31,5 +36,6 @@ pub mod statistics;
 pub mod summary;
 pub mod sweep;
 pub mod topology;
+pub mod trace;
 pub mod verdict;
 pub mod what_if;

@@ -8,6 +8,7 @@ use std::cmp::Ordering;
 use std::fmt;
 
 use crate::sim::motion::Angle;
+use crate::sim::share::Share;
 use crate::time::{BitRate, Span, Tbit};
 
 /// A unit: one of it is `ratio.0 / ratio.1` of the kind's smallest step.
@@ -78,6 +79,13 @@ const ANGLE: Kind = Kind {
     units: &[("rev", (Angle::UNITS_PER_REV as i128, 1)), ("deg", (Angle::UNITS_PER_REV as i128, 360))],
 };
 const GAIN: Kind = Kind { noun: "a gain", example: "1/4", step: "1/65536", unit_of_step: "", units: &[] };
+const SHARE: Kind = Kind {
+    noun: "a share",
+    example: "1 %",
+    step: "parts in 10^15",
+    unit_of_step: "of 10^15",
+    units: &[("%", (10i128.pow(13), 1)), ("ppm", (10i128.pow(9), 1)), ("ppb", (10i128.pow(6), 1))],
+};
 const RATE: Kind = Kind {
     noun: "a bit rate",
     example: "12 Mbit/s",
@@ -251,6 +259,23 @@ pub fn bit_rate(text: &str) -> Result<BitRate, QuantityError> {
         Some(rate) if of(rate) == centi_bps => Ok(rate),
         _ => Err(QuantityError::NoSuchRate { text: text.into(), nearest: nearest.unwrap_or(BitRate::M12) }),
     }
+}
+
+/// Reads a share of a whole, `"1 %"`, `"5 ppm"`, or as a plain number `"0.001"` and `"1e-6"`.
+///
+/// # Errors
+/// No share, one that is finer than 10^-15, or one that is not between 0 and 1.
+pub fn share(text: &str) -> Result<Share, QuantityError> {
+    let (number, unit) = Decimal::split(text, &SHARE)?;
+    let exponent = unit.strip_prefix(['e', 'E']).and_then(|exponent| exponent.parse::<i32>().ok());
+    let ratio = match exponent {
+        _ if unit.is_empty() => (Share::WHOLE.into(), 1),
+        Some(exponent @ -30..=2) if exponent >= -15 => (10i128.pow((15 + exponent) as u32), 1),
+        Some(exponent @ -30..=2) => (1, 10i128.pow((-15 - exponent) as u32)),
+        _ => ratio(text, unit, &SHARE, &[])?,
+    };
+    let parts = whole(text, &SHARE, number.times(ratio))?;
+    u64::try_from(parts).ok().and_then(Share::new).ok_or_else(|| range(text, &SHARE, "0", "1"))
 }
 
 /// A decimal number as it was written: `digits` / 10^`places`.
@@ -583,6 +608,34 @@ mod tests {
     }
 
     #[test]
+    fn shares_are_exact() {
+        let whole = Share::WHOLE;
+        for (text, parts) in [
+            ("1 %", whole / 100),
+            ("100%", whole),
+            ("0.5 %", whole / 200),
+            ("3 ppm", 3 * whole / 1_000_000),
+            ("2 ppb", 2_000_000),
+            ("1e-6", whole / 1_000_000),
+            ("2.5E-9", 2_500_000),
+            ("100e-17", 1),
+            ("0.25", whole / 4),
+            ("1", whole),
+            ("0", 0),
+        ] {
+            assert_eq!(share(text).map(Share::parts), Ok(parts), "{text}");
+        }
+        assert_eq!(message(share("often")), "\"often\" is not a share: write a number and a unit, such as \"1 %\"");
+        assert!(message(share("1e-16")).contains("is not a whole number of parts in 10^15"));
+        for text in ["-1 %", "101 %", "2", "1e1", "-1e-6"] {
+            assert!(message(share(text)).ends_with("is beyond the range of a share, 0 to 1"), "{text}");
+        }
+        for text in ["1 s", "1e99", "1e-99", "1e"] {
+            assert!(matches!(share(text), Err(QuantityError::Unit { .. })), "{text}");
+        }
+    }
+
+    #[test]
     fn every_bit_rate_is_read_as_it_is_shown() {
         for &rate in BitRate::ALL {
             assert_eq!(bit_rate(rate.text()), Ok(rate));
@@ -609,7 +662,7 @@ mod tests {
         #[test]
         fn no_text_panics(text in "[-+.0-9_ a-zµ/]{0,40}") {
             let _ = (span(&text, Some(BitRate::M12)), tbit(&text), millimetres(&text), ppb(&text));
-            let _ = (micro_rpm(&text), angle(&text), bit_rate(&text));
+            let _ = (micro_rpm(&text), angle(&text), bit_rate(&text), share(&text));
         }
     }
 }

@@ -4,7 +4,7 @@ use super::acyclic::AcyclicSummary;
 use super::live_list::Seen;
 use super::masters;
 use super::summary::{
-    Distribution, LedSummary, LinkSummary, Receptions, SlaveSummary, StationSummary, Summary, Timing,
+    Distribution, FaultSummary, LedSummary, LinkSummary, Receptions, SlaveSummary, StationSummary, Summary, Timing,
 };
 use super::verdict;
 use crate::observation::Leds;
@@ -16,6 +16,8 @@ pub const SLAVES: usize = 16;
 pub const LINKS: usize = 8;
 /// Stations of the live list that are shown, of those that are remarkable; of more, the worst.
 pub const STATIONS: usize = 4;
+/// First faults that are shown.
+pub const FAULTS: usize = 8;
 
 /// The summary as text; `dir` is where its files are, none if there are none.
 pub fn render(summary: &Summary, dir: Option<&str>) -> String {
@@ -30,10 +32,19 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     spread(summary, &mut lines);
     links(summary, &mut lines);
     acyclic(summary, &mut lines);
+    faults(summary, &mut lines);
     fingerprint(summary, &mut lines);
     files(summary, dir, &mut lines);
     verdicts(summary, &mut lines);
     lines.iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
+}
+
+/// The beginning of the page and where the files are, for one of several runs.
+pub(super) fn brief(summary: &Summary, dir: Option<&str>) -> Vec<String> {
+    let mut lines = Vec::new();
+    network(summary, &mut lines);
+    files(summary, dir, &mut lines);
+    lines
 }
 
 fn network(summary: &Summary, lines: &mut Vec<String>) {
@@ -317,6 +328,23 @@ fn acyclic(summary: &Summary, lines: &mut Vec<String>) {
     }
 }
 
+/// Where each fault was first, and what tells more of it.
+fn faults(summary: &Summary, lines: &mut Vec<String>) {
+    if summary.first_faults.is_empty() {
+        return;
+    }
+    lines.push(String::new());
+    for FaultSummary { slave, code, cycle, count, replay, .. } in summary.first_faults.iter().take(FAULTS) {
+        let times = if *count == 1 { String::new() } else { format!(", the first of {count}") };
+        lines.push(format!("{code} of slave {slave} in cycle {cycle}{times}: {replay}"));
+    }
+    let more = summary.counts.faults.saturating_sub(summary.first_faults.len().min(FAULTS) as u64);
+    if more > 0 {
+        let there = summary.files.iter().any(|file| file == "events.csv");
+        lines.push(format!("and {more} more{}", if there { " in events.csv" } else { "" }));
+    }
+}
+
 fn fingerprint(summary: &Summary, lines: &mut Vec<String>) {
     if !summary.fingerprint.is_empty() {
         let parts: Vec<_> = summary.fingerprint.iter().map(|(name, text)| format!("{name} {text}")).collect();
@@ -330,6 +358,9 @@ fn files(summary: &Summary, dir: Option<&str>, lines: &mut Vec<String>) {
     lines.extend(thinned.map(ToString::to_string));
     if summary.events_left_out > 0 {
         lines.push(format!("events.csv: the last {} events are left out", summary.events_left_out));
+    }
+    if let Some(flight) = &summary.flight {
+        lines.push(format!("flight recorder: {flight}"));
     }
     if let Some(dir) = dir {
         lines.push(format!("{} in {dir}", number(summary.files.len(), "file")));
@@ -519,5 +550,37 @@ fingerprint: wire 0123456789abcdef
         let text = render(&summary, None);
         assert!(text.contains("\ncycles.csv: cycles 0 to 511, one in 1,"), "{text}");
         assert!(text.ends_with("; 7 rows left out\nevents.csv: the last 9 events are left out\n"), "{text}");
+    }
+
+    #[test]
+    fn of_many_faults_the_first_ones_are_shown_with_what_replays_them() {
+        let fault = |slave: u8| FaultSummary {
+            slave,
+            code: "0F04".to_owned(),
+            cycle: 100 + u64::from(slave),
+            at: Span::from_ms(1),
+            count: 1 + u64::from(slave % 2),
+            replay: format!("isodp replay a.toml --seed 1 --cycle {} --window 5", 100 + u64::from(slave)),
+        };
+        let lines = |summary: &Summary| {
+            let mut lines = Vec::new();
+            faults(summary, &mut lines);
+            lines
+        };
+        let mut summary = sample::run();
+        assert!(lines(&summary).is_empty());
+        summary.counts.faults = 2;
+        summary.first_faults = vec![fault(3)];
+        summary.files = Vec::new();
+        let first = "0F04 of slave 3 in cycle 103, the first of 2: isodp replay a.toml --seed 1 --cycle 103 --window 5";
+        assert_eq!(lines(&summary), ["", first, "and 1 more"]);
+        summary.counts.faults = 30;
+        summary.first_faults = (3..23).map(fault).collect();
+        summary.files = vec!["events.csv".to_owned()];
+        let all = lines(&summary);
+        assert_eq!((all.len(), all.last().map(String::as_str)), (2 + FAULTS, Some("and 22 more in events.csv")));
+        summary.counts.faults = 1;
+        summary.first_faults = vec![fault(4)];
+        assert_eq!(lines(&summary).len(), 2);
     }
 }

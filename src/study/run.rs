@@ -7,13 +7,15 @@ use super::build;
 use super::count::Counts;
 use super::episode::Episodes;
 use super::event_budget::{EventBudget, NoHeadway};
-use super::export::{EXPORTERS, ExportError, Exports, Staged, Target};
+use super::export::{EXPORTERS, ExportError, Exports, Staged, Target, capture};
 use super::figure::Figures;
+use super::first_fault::FirstFaults;
+use super::flight::{FlightRecorder, Recording};
 use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, MasterLayout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
 use super::plan::rules;
-use super::plot::{BusCycle, Distribution, Distributions, LinkLatencies, PlotError, PlotMeta, Plots};
+use super::plot::{BusCycle, Distribution, Distributions, EpisodeTimes, LinkLatencies, PlotError, PlotMeta, Plots};
 use super::row::Sink;
 use super::scenario::{Extent, Scenario};
 use super::summary::{Facts, SlaveFacts, Summary};
@@ -99,6 +101,7 @@ impl Shafts for Speeds {
 /// Everything that takes rows.
 struct Sinks {
     histograms: Histograms,
+    faults: FirstFaults,
     episodes: Episodes,
     exports: Option<Exports>,
     plots: Option<Plots>,
@@ -122,6 +125,7 @@ impl Sink for Sinks {
     }
     fn event(&mut self, row: &super::row::EventRow) {
         self.histograms.event(row);
+        self.faults.event(row);
         self.episodes.event(row);
         self.exports.event(row);
         self.plots.event(row);
@@ -154,31 +158,39 @@ pub fn run<Q: Queue<NetworkEvent>>(
     });
     let draws = dir.is_some() && scenario.record.plots;
     let plots = draws.then(|| Plots::new(meta(scenario, &layout)));
-    let episodes = episodes(scenario, &layout);
-    let sinks = Sinks { histograms: Histograms::new(&layout), episodes, exports: exports.transpose()?, plots };
+    let sinks = Sinks {
+        histograms: Histograms::new(&layout),
+        faults: FirstFaults::default(),
+        episodes: episodes(scenario, &layout),
+        exports: exports.transpose()?,
+        plots,
+    };
     let metrics = Metrics::new(layout, Speeds::of(scenario), sinks);
     let bus = draws.then(|| BusCycle::new(scenario.master.address));
+    let flight = scenario.record.flight.as_ref().filter(|_| dir.is_some());
+    let flight = flight.map(|settings| FlightRecorder::new(scenario, settings));
 
     let mut network: Network<Node, Q> = build::network(scenario);
-    let mut recorder = (Fingerprints::new(scenario.master.address), (metrics, bus));
+    let mut recorder = (Fingerprints::new(scenario.master.address), (metrics, (bus, flight)));
     EventBudget::of(scenario).run(&mut network, scenario, &mut recorder, watch)?;
-    let (fingerprints, (metrics, bus)) = recorder;
+    let (fingerprints, (metrics, (bus, flight))) = recorder;
+    let flight = flight.map(|flight| flight.finish(network.now()));
     let (counts, mut sinks) = metrics.finish(network.now());
     sinks.episodes.finish(network.now());
 
     let summary = Summary::new(facts(scenario), &counts, &sinks.histograms);
-    conclude(scenario, summary, counts, sinks, (&fingerprints, bus.as_ref()), dir)
+    conclude(scenario, summary, (counts, sinks), (&fingerprints, bus.as_ref(), flight.as_ref()), dir)
 }
 
 /// Adds the fingerprints, the LEDs, what slaves and masters did and the topology, then writes the files.
 fn conclude(
     scenario: &Scenario,
     mut summary: Summary,
-    counts: Counts,
-    Sinks { histograms, episodes, exports, plots }: Sinks,
-    (fingerprints, bus): (&Fingerprints, Option<&BusCycle>),
+    (counts, sinks): (Counts, Sinks),
+    (fingerprints, bus, flight): (&Fingerprints, Option<&BusCycle>, Option<&Recording>),
     dir: Option<PathBuf>,
 ) -> Result<Outcome, RunError> {
+    let Sinks { histograms, faults, episodes, exports, plots } = sinks;
     let mut digest = Digest::default();
     digest.octets(&serde_json::to_vec(&summary)?);
     let statistics = digest.value();
@@ -193,6 +205,8 @@ fn conclude(
     summary.show_leds(&counts);
     summary.show_receptions(&counts);
     summary.show_acyclic(&counts);
+    summary.show_faults(&faults, &scenario.invocation);
+    summary.flight = flight.map(Recording::line);
     summary.show_episodes(&episodes);
     let figures = Figures::new(counts, histograms, episodes);
     summary.verdicts = verdict::judge(&scenario.expectations, &figures);
@@ -204,12 +218,17 @@ fn conclude(
 
     let mut pictures = Vec::new();
     if let (Some(dir), Some(plots), Some(bus)) = (&dir, &plots, bus) {
-        pictures = stage(dir, plots.pictures(&distributions(figures.histograms()), bus)?)?;
-        summary.files.extend(plots.files().map(str::to_owned));
+        let drawn = plots.pictures(&distributions(&figures), bus)?;
+        summary.files.extend(drawn.iter().map(|picture| picture.0.to_owned()));
+        pictures = stage(dir, drawn)?;
     }
     if let Some(dir) = &dir {
         pictures.extend(stage(dir, vec![(TOPOLOGY, map.text(true).join("\n") + "\n")])?);
         summary.files.push(TOPOLOGY.to_owned());
+    }
+    if let (Some(dir), Some(flight)) = (&dir, flight) {
+        pictures.extend(capture::stage(dir, flight)?);
+        summary.files.extend(capture::FORMATS.iter().map(|format| format.file.to_owned()));
     }
     if let Some(exports) = exports {
         exports.finish(pictures, figures.histograms(), &mut summary)?;
@@ -278,6 +297,7 @@ fn meta(scenario: &Scenario, layout: &Layout) -> PlotMeta {
         links: layout.links().to_vec(),
         masters: 1 + scenario.class1.len() + scenario.class2.len(),
         duration: scenario.master.t_dp * cycles(scenario) as i64,
+        disturbances: scenario.disturbances.iter().map(|disturbance| disturbance.name.clone()).collect(),
         topology: Map::of(scenario),
     }
 }
@@ -298,8 +318,9 @@ fn facts(scenario: &Scenario) -> Facts {
     }
 }
 
-/// What the pictures show of the histograms.
-fn distributions(histograms: &Histograms) -> Distributions {
+/// What the pictures show of the figures.
+fn distributions(figures: &Figures) -> Distributions {
+    let histograms = figures.histograms();
     let of = |name: &str, subject| {
         let quantity = Quantity::named(name).expect("a line of the registry");
         histograms.get(name, subject).map_or_else(Distribution::default, |found| distribution(quantity, found))
@@ -314,6 +335,7 @@ fn distributions(histograms: &Histograms) -> Distributions {
         t_dp_deviation: of("t_dp_deviation", Subject::Network),
         synch_delay: of("synch_delay", Subject::Network),
         links: histograms.layout().links().iter().map(link).collect(),
+        episodes: EpisodeTimes::all(figures.episodes()),
     }
 }
 

@@ -14,7 +14,9 @@ pub mod error;
 mod expect;
 #[cfg(test)]
 mod faults;
+mod flight;
 mod gsd;
+mod jitter;
 pub mod kinds;
 mod link;
 mod options;
@@ -28,6 +30,7 @@ pub(super) mod tree;
 use check::Check;
 pub use class2::{Class2, Class2Job};
 pub use error::{Fault, Position, Problem, ScenarioError};
+pub use flight::Flight;
 pub use link::{Link, Sample, Table};
 pub use station::Station;
 
@@ -36,11 +39,13 @@ use crate::device::profile::Device;
 use crate::dp::handler::{Patch, StartupTelegram};
 pub use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
-pub use crate::sim::fault::line::{LineFault, Service};
+pub use crate::sim::fault::line::{Effect, LineFault};
+pub use crate::sim::fault::which::{Service, Which};
 pub use crate::sim::fault::window::{Bursts, Window};
 pub use crate::sim::fault::{Disturbance, What};
+use crate::sim::jitter::GcJitter;
 use crate::sim::motion::Motion;
-use crate::sim::noise::GcJitter;
+use crate::study::invocation::Invocation;
 use crate::study::verdict::Expectation;
 use crate::time::{Span, Tbit};
 use crate::wire::Address;
@@ -86,6 +91,8 @@ pub struct Scenario {
     pub disturbances: Vec<Disturbance>,
     /// What to keep.
     pub record: Record,
+    /// The file and the overrides that it was read from.
+    pub invocation: Invocation,
     /// What is expected of the run's figures, in the order of the file.
     pub expectations: Vec<Expectation>,
 }
@@ -189,12 +196,12 @@ impl Scenario {
         overrides: &[(String, String)],
         check: Check,
     ) -> Result<Self, ScenarioError> {
-        let &Origin { dir, name, source } = origin;
+        let &Origin { dir, name, source: file } = origin;
         if text.trim().is_empty() {
             let fault = Fault::new("the scenario is empty").help("it needs [run], [bus], [master] and a [[slave]]");
-            return Err(ScenarioError::about_file(source, fault));
+            return Err(ScenarioError::about_file(file, fault));
         }
-        let source = Source::new(source, text, overrides).in_dir(dir);
+        let source = Source::new(file, text, overrides).in_dir(dir);
         let root = source.parse()?;
         let mut reader = Reader::new(&source);
         reader.proposes = check == Check::ToPropose;
@@ -205,6 +212,7 @@ impl Scenario {
             if problems.is_empty() {
                 name.clone_into(&mut scenario.name);
                 scenario.question = question(text);
+                scenario.invocation = Invocation { file: file.to_owned(), sets: overrides.to_vec() };
                 return Ok(scenario);
             }
         }
@@ -322,7 +330,7 @@ impl Bus {
 }
 
 /// The master with its application.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Master {
     /// Its address, 0..=125.
     pub address: Address,
@@ -595,6 +603,8 @@ pub struct Record {
     pub tables: Vec<CsvTable>,
     /// Most rows that a CSV file keeps before it is thinned, at least 1.
     pub rows: u64,
+    /// What the flight recorder keeps; none is off.
+    pub flight: Option<Flight>,
 }
 
 /// A CSV file.
@@ -692,7 +702,9 @@ pub(crate) mod tests {
                 plots: true,
                 tables: CsvTable::ALL.iter().map(|&(_, table)| table).collect(),
                 rows: 20_000,
+                flight: None,
             },
+            invocation: Invocation::default(),
             expectations: Vec::new(),
         }
     }

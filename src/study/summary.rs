@@ -7,9 +7,12 @@ use super::count::{Counts, LinkCounts, SlaveCounts};
 use super::episode::{EpisodeSummary, Episodes};
 use super::export::decimal::Decimal;
 use super::export::thinning::Thinning;
+use super::first_fault::{FirstFault, FirstFaults};
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
+use super::invocation::Invocation;
 use super::live_list::{Seen, Station};
 use super::masters::MasterSummary;
+use super::trace::WINDOW;
 use super::verdict::Verdict;
 use crate::observation::Leds;
 use crate::time::{BitRate, Span};
@@ -48,6 +51,12 @@ pub struct Summary {
     /// Acyclic services per class of master; none before [`Summary::show_acyclic`].
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub acyclic: Vec<AcyclicSummary>,
+    /// Each slave's first fault of each code, in the order of time; none before [`Summary::show_faults`].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub first_faults: Vec<FaultSummary>,
+    /// What the flight recorder kept; none where it is off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flight: Option<String>,
     /// From disturbances to faults, and back to full operation; none before [`Summary::show_episodes`] and where no slave
     /// was harmed.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -345,6 +354,24 @@ pub struct LinkSummary {
     pub distributions: Vec<(&'static str, Distribution)>,
 }
 
+/// A fault of a slave where it was latched first.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+pub struct FaultSummary {
+    /// The slave.
+    pub slave: u8,
+    /// The code (manual 5.3).
+    pub code: String,
+    /// In which cycle.
+    pub cycle: u64,
+    /// True time since power-on.
+    #[serde(rename = "at_ms", serialize_with = "ms")]
+    pub at: Span,
+    /// How often the slave latched it in the whole run.
+    pub count: u64,
+    /// The command line that tells the cycles around it.
+    pub replay: String,
+}
+
 /// What a subscriber got from one publisher.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub struct Receptions {
@@ -445,6 +472,8 @@ impl Summary {
             links: layout.links().iter().map(link).collect(),
             live_list: counts.live_list.stations().filter_map(StationSummary::of).collect(),
             acyclic: Vec::new(),
+            first_faults: Vec::new(),
+            flight: None,
             episodes: None,
             network: Network {
                 scenario: facts.scenario,
@@ -487,6 +516,19 @@ impl Summary {
         self.acyclic = AcyclicSummary::all(&counts.acyclic);
     }
 
+    /// Adds where each fault was first, and how to look at it again. How often each came is counted among the figures.
+    pub fn show_faults(&mut self, faults: &FirstFaults, invocation: &Invocation) {
+        let seed = self.network.seed;
+        let of = |fault: &FirstFault| FaultSummary {
+            slave: fault.slave.get(),
+            code: format!("{:04X}", fault.code),
+            cycle: fault.cycle,
+            at: fault.at.since_zero(),
+            count: fault.count,
+            replay: invocation.replay(seed, fault.cycle, WINDOW),
+        };
+        self.first_faults = faults.all().iter().map(of).collect();
+    }
     /// Whether every expectation of the scenario holds.
     pub fn passed(&self) -> bool {
         self.verdicts.iter().all(|verdict| verdict.passed)
@@ -623,6 +665,7 @@ macro_rules! units {
 }
 units! {
     s = s of Span;
+    ms = ms of Span;
     us = us of Span;
     us_or_null = us of Option<Span>;
     ns_or_null = ns of Option<Span>;

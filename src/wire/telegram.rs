@@ -331,6 +331,19 @@ impl Frame {
         frame.len = octets.len() as u8;
         Some(frame)
     }
+    /// Becomes a copy of any octets, valid or not; nothing of them above 255.
+    pub fn set(&mut self, octets: &[u8]) {
+        self.len = 0;
+        if let Some(place) = self.octets.get_mut(..octets.len()) {
+            place.copy_from_slice(octets);
+            self.len = octets.len() as u8;
+        }
+    }
+    /// Becomes so many octets of zero, 255 at most.
+    pub fn set_len(&mut self, len: usize) {
+        self.len = len.min(MAX_FRAME) as u8;
+        self.octets_mut().fill(0);
+    }
     /// The octets.
     pub fn octets(&self) -> &[u8] {
         &self.octets[..self.len()]

@@ -1,12 +1,13 @@
 //! A second opinion on every telegram that our stations send: profirust's parser, compared field by field.
 
 use std::collections::BTreeSet;
+use std::mem::take;
 
 use isodp::device::node::Node;
-use isodp::observation::Observation;
+use isodp::observation::{Disturbance, Observation};
 use isodp::sim::network::{Network, NetworkEvent, Until};
 use isodp::sim::queue::NearQueue;
-use isodp::sim::record::{Recorder, Stamp, Transmission};
+use isodp::sim::record::{Origin, Recorder, Stamp, Transmission};
 use isodp::study::build;
 use isodp::study::scenario::Extent;
 use isodp::time::Time;
@@ -16,17 +17,24 @@ use rayon::prelude::*;
 
 use crate::support::{scenario, shipped};
 
-/// Telegrams that differ.
+/// Telegrams that differ, as stations sent them.
 #[derive(Default)]
-struct Distinct(BTreeSet<Vec<u8>>);
+struct Distinct {
+    telegrams: BTreeSet<Vec<u8>>,
+    /// The scenario made the next one wrong.
+    damaged: bool,
+}
 
 impl Recorder for Distinct {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
-        if !self.0.contains(telegram.octets) {
-            self.0.insert(telegram.octets.to_vec());
+        let sent = telegram.origin == Origin::Sender && !take(&mut self.damaged);
+        if sent && !self.telegrams.contains(telegram.octets) {
+            self.telegrams.insert(telegram.octets.to_vec());
         }
     }
-    fn observe(&mut self, _: Stamp<'_>, _: &Observation) {}
+    fn observe(&mut self, _: Stamp<'_>, what: &Observation) {
+        self.damaged |= matches!(what, Observation::Disturbed { how: Disturbance::WrongBits, .. });
+    }
 }
 
 fn telegrams(name: &str) -> BTreeSet<Vec<u8>> {
@@ -38,7 +46,7 @@ fn telegrams(name: &str) -> BTreeSet<Vec<u8>> {
     };
     let mut distinct = Distinct::default();
     assert!(network.run(until, 100_000_000, &mut distinct), "the run does not end");
-    distinct.0
+    distinct.telegrams
 }
 
 /// Our reading of FC in profirust's words.

@@ -59,7 +59,7 @@ impl Bench {
         bench.step(Input::PowerOn);
         bench
     }
-    fn step(&mut self, input: Input<'_, core::convert::Infallible>) {
+    fn step(&mut self, input: Input<'_, HoldToken>) {
         let mut out = Outbox::new();
         self.station.step(self.now, input, &mut out);
         for (which, order) in out.orders() {

@@ -534,3 +534,43 @@ fn a_second_holder_gives_the_token_up() {
     let rings: Vec<String> = line.rings().iter().map(|ring| alloc::format!("{ring:?}")).collect();
     assert_eq!(rings, ["[3, 5, 9]"; 3], "and the ring goes on");
 }
+
+#[test]
+fn a_token_that_is_held_leaves_later_and_its_sender_waits_for_it_from_there() {
+    let hold = Span::from_us(300);
+    let mut active = station_in(USE);
+    let leave = |active: &mut Active| {
+        let (mut out, begin) = (Outbox::new(), Local::from_ticks(1_000_000));
+        let end = active.pass_token(begin, &mut out);
+        let (send, frame) = out.sending().expect("the token");
+        assert_eq!(frame.octets(), [0xDC, 9, 5]);
+        // T_SL counts from the last bit.
+        let orders: Vec<_> = out.orders().collect();
+        assert_eq!(orders, [(Timer::Slot as usize, Order::At(end))]);
+        (send.at - begin, end - send.at, name(active))
+    };
+    let octets = BitRate::M12.octets(3);
+    active.hold_token(HoldToken(hold));
+    assert_eq!(leave(&mut active), (hold, octets, PASS));
+    let mut active = station_in(USE);
+    active.hold_token(HoldToken(hold));
+    active.hold_token(HoldToken(Span::ZERO));
+    assert_eq!(leave(&mut active), (Span::ZERO, octets, PASS));
+}
+
+#[test]
+fn a_ring_with_a_station_that_holds_the_token_turns_slower_and_loses_nobody() {
+    let visits = |hold| {
+        let mut line = Line::new(&[9, 5, 3], 100_000);
+        (0..3).for_each(|node| line.power_on(node));
+        line.run(Span::from_ms(20));
+        line.nodes[1].active.hold_token(HoldToken(hold));
+        let before = line.nodes[0].visits.len();
+        line.run(Span::from_ms(40));
+        let lost = line.seen(9, &Observation::TokenClaimed) + line.seen(3, &Observation::TokenClaimed);
+        (line.nodes[0].visits.len() - before, lost, line.collisions)
+    };
+    let (free, held) = (visits(Span::ZERO), visits(Span::from_us(300)));
+    assert!(held.0 > 10 && held.0 * 5 < free.0 * 3, "{free:?} {held:?}");
+    assert_eq!((held.1, held.2), (free.1, free.2));
+}

@@ -15,14 +15,17 @@ const TOKEN_OCTETS: usize = 3;
 const TWICE: u8 = 2;
 
 impl Active {
-    /// Passes the token to the next station, its first bit at `at`. Returns its end. Alone in the ring a station goes
-    /// on at once; otherwise [`Confirm::TokenHeld`] tells when the token is back.
+    /// Passes the token to the next station, its first bit at `at`, or later where it is held ([`HoldToken`]). Returns its
+    /// end. Alone in the ring a station goes on at once; otherwise [`Confirm::TokenHeld`] tells when the token is back.
+    ///
+    /// [`HoldToken`]: super::HoldToken
     ///
     /// # Panics
     /// While an answer is awaited: a bug of the caller.
     pub fn pass_token(&mut self, at: Local, out: &mut Outbox) -> Local {
         assert!(self.may_send(), "the token is passed when nothing is awaited");
-        self.pass_to(at, 1, out)
+        // The station itself is slow and knows when its token leaves: were it late on the line alone, it would be repeated.
+        self.pass_to(at + self.hold, 1, out)
     }
     fn pass_to(&mut self, at: Local, attempt: u8, out: &mut Outbox) -> Local {
         let to = self.ring.ns();

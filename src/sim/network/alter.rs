@@ -3,12 +3,12 @@
 //! A change takes effect between two events. What a station has decided already stays: a telegram that is on its way, or
 //! that was given to the line for a later instant, keeps its instants.
 
-use super::{Deadline, Network, NetworkEvent};
+use super::{Network, NetworkEvent};
 use crate::fdl::Station;
-use crate::sim::crystal::CrystalError;
+use crate::sim::crystal::{Crystal, CrystalError};
 use crate::sim::fault::Faults;
+use crate::sim::jitter::{GcJitter, JitterError};
 use crate::sim::motion::Shaft;
-use crate::sim::noise::{GcJitter, JitterError};
 use crate::sim::queue::Queue;
 use crate::wire::Address;
 
@@ -21,8 +21,11 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.jitter.change(jitter)
     }
     /// From now on these are the disturbances.
-    pub fn set_faults(&mut self, faults: Faults) {
+    pub fn set_faults(&mut self, mut faults: Faults) {
+        let turning = faults.take_turning();
+        faults.go_on_from(&self.faults);
         self.faults = faults;
+        self.turn_over(turning);
     }
     /// The crystal of the station at `address` goes on `ppb` fast (10^-9), without a step in its reading. What the
     /// station waits for comes when the crystal shows it. An address without station is ignored.
@@ -31,13 +34,12 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// [`CrystalError::Offset`] for an offset that no crystal has; nothing is changed then.
     pub fn set_crystal(&mut self, address: Address, ppb: i64) -> Result<(), CrystalError> {
         let Some(slot) = self.by_address[usize::from(address.get())] else { return Ok(()) };
-        let (slot, now) = (usize::from(slot), self.now);
-        self.slots[slot].site.crystal.set_rate(now, ppb)?;
-        for which in 0..self.slots[slot].deadlines.len() {
-            if let Deadline { due: Some((at, _)), .. } = self.slots[slot].deadlines[which] {
-                Self::arm(&mut self.queue, &mut self.slots[slot], which, at, now);
-            }
+        let slot = usize::from(slot);
+        if ppb.abs() > Crystal::MAX_PPB {
+            return Err(CrystalError::Offset(ppb));
         }
+        self.slots[slot].offset.own = ppb;
+        self.set_rate(slot);
         Ok(())
     }
     /// The shaft of the station at `address` goes on from where it is as `shaft` moves. A station without shaft, or an

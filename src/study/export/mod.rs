@@ -3,13 +3,16 @@
 //! All files of a run appear together at its end: each is written under a temporary name in the directory where it will
 //! stay and renamed when everything is whole. If anything fails, none of them stays.
 
+pub mod capture;
 pub mod csv;
 pub mod decimal;
 pub mod hlog;
 pub mod json;
 pub mod live_list;
+pub mod pcapng;
 pub mod staged;
 pub mod thinning;
+pub mod vcd;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,6 @@
 //! Families: what is counted or noted once in a run, of the network, a slave, a link, a master, a station or acyclic
 //! services. Distributions are not among them; every quantity has its own.
 
-use core::ops::Add;
-
 use super::Figures;
 use super::value::{Unit, Value};
 use crate::observation::{AcyclicResult, MasterMode, Phase, PllState, SlaveState};
@@ -52,9 +50,11 @@ pub enum Of {
     Acyclic(fn(&ClassCounts) -> Option<Value>),
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "the signature of a family's line")]
 const fn count(count: u64) -> Option<Value> {
     Some(Value::Count(count))
 }
+#[expect(clippy::unnecessary_wraps, reason = "the signature of a family's line")]
 const fn truth(truth: bool) -> Option<Value> {
     Some(Value::Truth(truth))
 }
@@ -66,7 +66,7 @@ fn instant(moment: Option<Moment>) -> Option<Value> {
 }
 /// The sum over all slaves.
 fn sum(figures: &Figures, of: fn(&SlaveCounts) -> u64) -> Option<Value> {
-    count(figures.counts.slaves.iter().map(of).fold(0, Add::add))
+    count(figures.counts.slaves.iter().map(of).sum())
 }
 /// The sum over all stations of the live list.
 fn stations(figures: &Figures, of: fn(&Station) -> u64) -> Option<Value> {
@@ -85,6 +85,7 @@ fn share(slave: &SlaveCounts) -> Option<Value> {
     let all = slave.phases.iter().copied().sum::<Span>().ticks();
     (all > 0).then(|| Value::Share(slave.phases[Phase::Operation as usize].ticks() as f64 / all as f64))
 }
+#[expect(clippy::unnecessary_wraps, reason = "the signature of a family's line")]
 fn in_phase(slave: &SlaveCounts, phase: Phase) -> Option<Value> {
     Some(Value::Span(slave.phases[phase as usize]))
 }

@@ -413,7 +413,7 @@ fn what(scope: Scope, end: &str) -> Option<What> {
 /// The error for a name whose end is no figure of `scope`.
 fn unknown(name: &str, scope: Scope, end: &str) -> FigureError {
     let message = format!("there is no figure \"{}\"", cut(name));
-    if end.is_empty() {
+    if end.is_empty() && scope != Scope::Network {
         let example = scope.families().next().map_or("", |family| family.name);
         return FigureError::new(message, format!("a figure comes behind it, such as \"{name}.{example}\""));
     }

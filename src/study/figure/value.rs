@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(numbers, [0.123_25, 3.0, 0.25, 99.95, 1.0]);
         let span = Value::Span(Span::from_us(1_500));
         let in_all = [Unit::Ns, Unit::Us, Unit::Ms, Unit::S].map(|unit| span.number(unit));
-        assert_eq!(in_all, [1_500_000.0, 1_500.0, 1.5, 0.001_5]);
+        assert_eq!(in_all.to_vec(), [1_500_000.0, 1_500.0, 1.5, 0.001_5]);
     }
 
     #[test]

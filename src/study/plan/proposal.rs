@@ -6,7 +6,7 @@ use super::rules::{Facts, Weight, stray};
 use super::{Plan, smallest_t_o};
 use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
-use crate::sim::noise::GcJitter;
+use crate::sim::jitter::GcJitter;
 use crate::study::build;
 use crate::study::scenario::{Scenario, Slave, Watchdog};
 use crate::time::{Span, Tbit};
@@ -68,9 +68,9 @@ impl Proposal {
 
 /// The times of an isochronous network: T_DP, of every slave T_I, T_O and the window, and the T_TR of several masters.
 fn times(network: &mut Scenario, grid: Span) {
-    let (jitter, master) = (network.master.gc_jitter, network.master.address);
+    let (jitter, master) = (network.master.gc_jitter.clone(), network.master.address);
     let own = |slave: &&mut Slave| !slave.silent && slave.master == master && slave.device.isochronous;
-    network.slaves.iter_mut().filter(own).for_each(|slave| window(slave, jitter));
+    network.slaves.iter_mut().filter(own).for_each(|slave| window(slave, &jitter));
     let plan = Plan::of(network);
     for slave in network.slaves.iter_mut().filter(own) {
         slave.times.t_i = shortest_t_i(slave);
@@ -130,7 +130,7 @@ fn set(network: &mut Scenario, key: Key, amount: Amount) {
 
 /// The window of one slave: its own if it is wide enough for the device, its timers and the jitter, else the nearest that
 /// is; and its delay, where it is one.
-fn window(slave: &mut Slave, jitter: GcJitter) {
+fn window(slave: &mut Slave, jitter: &GcJitter) {
     let unit = Span::from_iso_units(1);
     let widest = Span::from_iso_units(slave.device.t_pll_w_max.into());
     let jitter = stray(jitter).map_or(Span::ZERO, |(stray, _)| stray * 2);
@@ -169,7 +169,7 @@ fn grid(network: &Scenario) -> Span {
 /// The shortest T_DP that all slaves allow and that holds everything, off the grid.
 fn shortest_t_dp(network: &Scenario, plan: &Plan) -> Span {
     let (master, bus) = (&network.master, &network.bus.params);
-    let jitter = stray(master.gc_jitter).map_or(Span::ZERO, |(stray, _)| stray);
+    let jitter = stray(&master.gc_jitter).map_or(Span::ZERO, |(stray, _)| stray);
     let jitter = if master.accumulate { jitter } else { jitter * 2 };
     // The token is back in time at least where no other master has T_TH.
     let whole = plan.content_at_most(Span::ZERO).max(plan.content()) + jitter;

@@ -15,8 +15,7 @@ use super::Plan;
 use super::finding::{Amount, Finding, Key, Relation};
 use crate::device::profile::Profile;
 use crate::dp::master::Pace;
-use crate::sim::noise::GcJitter;
-use crate::study::scenario::kinds::jitter_bound;
+use crate::sim::jitter::GcJitter;
 use crate::study::scenario::{Fault, Scenario, Slave};
 use crate::time::Span;
 
@@ -122,8 +121,9 @@ pub static INSTANTS: &[Rule] = &[
 pub static TIMERS: &[Rule] =
     &[Rule::must("timer step <= window in force", "manual 3.3.8, Model: D14", instants::quantum).clocked()];
 /// The master's jitter.
-pub static JITTER: &[Rule] =
-    &[Rule::must("jitter fits into the spare time", "Model: D1, D6", cycle::jitter_fits).clocked()];
+pub static JITTER: &[Rule] = &[Rule::must("jitter fits into the spare time", "Model: D1, D6", cycle::jitter_fits)
+    .or(&["master.t_dp"])
+    .clocked()];
 /// The start-up of slaves.
 pub static START_UP: &[Rule] =
     &[Rule::must("T_DP holds the start-up of a slave", "manual 3.3.2, Model: D6", cycle::start_up).clocked()];
@@ -279,11 +279,11 @@ pub fn symbol(key: &'static str) -> &'static str {
 }
 
 /// How far one SYNCH may stray, and how that is known; none without jitter (Model: D1).
-pub(super) fn stray(jitter: GcJitter) -> Option<(Span, &'static str)> {
-    match (jitter_bound(jitter), jitter) {
+pub(super) fn stray(jitter: &GcJitter) -> Option<(Span, &'static str)> {
+    match (jitter.bound(), jitter) {
         (Some(Span::ZERO), _) => None,
         (Some(bound), _) => Some((bound, "its bound")),
-        (None, GcJitter::Normal { sigma }) => Some((sigma * 6, "six times sigma")),
+        (None, GcJitter::Normal { sigma }) => Some((*sigma * 6, "six times sigma")),
         (None, _) => None,
     }
 }

@@ -262,6 +262,18 @@ impl Chart {
         Self { area, ruler: ruler.clone(), y }
     }
 
+    /// The same with ticks and grid lines of the y axis; its name is for the caller to write.
+    pub(super) fn beside(canvas: &mut Canvas<'_>, area: Area, ruler: &Ruler, y: Axis) -> Self {
+        let chart = Self::inside(area, ruler, y);
+        for (value, label) in chart.y.ticks((area.height() / 16).max(2) as usize) {
+            let y = chart.y(value);
+            canvas.path(&[(area.left, y), (area.right, y)], PALE, 1);
+            canvas.text((area.left - 8, y), &label, Font::new(TICK).right());
+        }
+        canvas.border(area, GREY);
+        chart
+    }
+
     /// Pixel of a value of the x axis.
     pub(super) fn x(&self, value: f64) -> i32 {
         self.ruler.x(value)

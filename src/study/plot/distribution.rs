@@ -1,5 +1,6 @@
 //! Distribution: what a histogram picture needs, as plain data from whoever counted.
 
+use super::recovery::EpisodeTimes;
 use crate::wire::Address;
 
 /// A counted quantity.
@@ -43,6 +44,8 @@ pub struct Distributions {
     pub synch_delay: Distribution,
     /// Per link.
     pub links: Vec<LinkLatencies>,
+    /// Times to faults and of recovery, by kind.
+    pub episodes: Vec<EpisodeTimes>,
 }
 
 impl Distribution {

@@ -10,9 +10,11 @@ use crate::time::Span;
 use crate::wire::Address;
 
 mod buckets;
+pub mod budget;
 mod bus_cycle;
 mod chart;
 mod distribution;
+mod disturbances;
 mod lanes;
 mod latch_skew;
 mod look;
@@ -20,6 +22,7 @@ pub mod plan;
 mod pll_convergence;
 mod position;
 mod publish_latency;
+mod recovery;
 pub mod sweep;
 mod synch_delay;
 mod t_dp_deviation;
@@ -30,13 +33,14 @@ mod timeline;
 mod topology;
 
 pub use distribution::{Distribution, Distributions, LinkLatencies};
+pub use recovery::EpisodeTimes;
 pub use telegrams::BusCycle;
 
 /// One line of the registry.
 struct Plot {
     file: &'static str,
-    /// Whether a network of this kind has anything to show there.
-    when: fn(&PlotMeta) -> bool,
+    /// Whether there is anything to show.
+    when: fn(&Material<'_>) -> bool,
     draw: fn(&Material<'_>) -> Result<String, String>,
 }
 
@@ -50,10 +54,12 @@ const PLOTS: &[Plot] = &[
     Plot { file: "bus_cycle.svg", when: always, draw: bus_cycle::draw },
     Plot { file: "position.svg", when: always, draw: position::draw },
     Plot { file: "topology.svg", when: always, draw: topology::draw },
-    Plot { file: "synch_delay.svg", when: PlotMeta::shares_token, draw: synch_delay::draw },
+    Plot { file: "synch_delay.svg", when: |material| material.meta.shares_token(), draw: synch_delay::draw },
+    Plot { file: "disturbances.svg", when: |material| material.plots.disturbed.any(), draw: disturbances::draw },
+    Plot { file: "recovery.svg", when: |material| !material.distributions.episodes.is_empty(), draw: recovery::draw },
 ];
 
-const fn always(_: &PlotMeta) -> bool {
+const fn always(_: &Material<'_>) -> bool {
     true
 }
 
@@ -76,6 +82,8 @@ pub struct PlotMeta {
     pub masters: usize,
     /// Simulated duration.
     pub duration: Span,
+    /// Names of the disturbances, by number.
+    pub disturbances: Vec<String>,
     /// The segments with their stations.
     pub topology: Map,
 }
@@ -122,6 +130,7 @@ pub struct Plots {
     deviation: t_dp_deviation::Deviation,
     delays: synch_delay::Delays,
     timeline: timeline::Timeline,
+    disturbed: disturbances::Disturbed,
     position: position::Positions,
 }
 
@@ -136,17 +145,13 @@ impl Plots {
             deviation: t_dp_deviation::Deviation::new(),
             delays: synch_delay::Delays::new(),
             timeline: timeline::Timeline::new(slaves),
+            disturbed: disturbances::Disturbed::new(slaves),
             position: position::Positions::new(slaves),
             meta,
         }
     }
 
-    /// Names of the files that [`Plots::pictures`] draws.
-    pub fn files(&self) -> impl Iterator<Item = &'static str> {
-        PLOTS.iter().filter(|plot| (plot.when)(&self.meta)).map(|plot| plot.file)
-    }
-
-    /// Every picture: name of its file and its text.
+    /// Every picture that has anything to show: name of its file and its text.
     ///
     /// # Errors
     /// The first picture that could not be drawn.
@@ -160,7 +165,7 @@ impl Plots {
             Ok(text) => Ok((plot.file, text)),
             Err(reason) => Err(PlotError { file: plot.file, reason }),
         };
-        PLOTS.iter().filter(|plot| (plot.when)(&self.meta)).map(draw).collect()
+        PLOTS.iter().filter(|plot| (plot.when)(&material)).map(draw).collect()
     }
 }
 
@@ -173,6 +178,7 @@ impl Sink for Plots {
         if let Some(index) = self.meta.index(row.slave) {
             self.pll.slave(index, row);
             self.timeline.slave(index, row);
+            self.disturbed.slave(index, row);
             self.position.slave(index, row);
         }
     }
@@ -180,6 +186,8 @@ impl Sink for Plots {
         // The latencies come as distributions.
     }
     fn event(&mut self, row: &EventRow) {
-        self.timeline.event(self.meta.index(row.station), row);
+        let slave = self.meta.index(row.station);
+        self.timeline.event(slave, row);
+        self.disturbed.event(slave, row);
     }
 }

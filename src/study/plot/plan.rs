@@ -71,7 +71,8 @@ fn free_running(scenario: &Scenario, planned: &Plan) -> String {
     )
 }
 
-fn meta(scenario: &Scenario) -> PlotMeta {
+/// What a picture says about a scenario that is no run's.
+pub(super) fn meta(scenario: &Scenario) -> PlotMeta {
     let t_dp = scenario.master.t_dp;
     PlotMeta {
         scenario: scenario.name.clone(),
@@ -82,6 +83,7 @@ fn meta(scenario: &Scenario) -> PlotMeta {
         slaves: scenario.configured().map(|slave| slave.address).collect(),
         links: scenario.links.iter().map(|link| (link.publisher, link.subscriber)).collect(),
         masters: 1,
+        disturbances: Vec::new(),
         duration: match scenario.run.duration {
             Extent::Time(span) => span,
             Extent::Cycles(cycles) => t_dp.checked_mul(cycles as i64).unwrap_or(Span::MAX),

@@ -9,6 +9,7 @@ use super::*;
 use crate::observation::{Disturbance, Inputs, Leds, Observation, Phase, PllState, SlaveCause, SlaveState};
 use crate::sim::crystal::Crystal;
 use crate::sim::record::{Origin, Recorder, Stamp, Transmission};
+use crate::study::episode::SINGLES;
 use crate::study::topology::{Segment, Station, Via};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::{Fcb, Frame, Header, Sap, Service, Status};
@@ -81,6 +82,7 @@ impl World {
             slaves,
             links,
             masters: 2,
+            disturbances: vec!["lost clocks".to_owned(), "noise".to_owned()],
             duration: t_dp * cycles as i64,
             topology,
         };
@@ -191,7 +193,7 @@ impl World {
             self.plots.event(&EventRow { at, cycle, station: address(station), what });
         };
         match cycle {
-            699 | 700 | 950 => event(2, Observation::Disturbed { number: 0, how: Disturbance::Lost }),
+            150 | 699 | 700 | 950 => event(2, Observation::Disturbed { number: 0, how: Disturbance::Lost }),
             701 => event(4, Observation::Fault { code: 0x0F04 }),
             740 => event(4, Observation::Acknowledged { code: 0x0F04 }),
             900 => {
@@ -295,6 +297,26 @@ impl World {
     }
 
     fn count(&mut self) {
+        let times = |recovery, harm: &str, bins: Vec<(f64, f64, u64)>| EpisodeTimes {
+            recovery,
+            harm: harm.to_owned(),
+            count: bins.iter().map(|bin| bin.2).sum(),
+            median: bins[bins.len() / 2].0,
+            max: bins[bins.len() - 1].1,
+            bins,
+        };
+        if self.plots.disturbed.any() {
+            let dots = vec![(1.834, 1.834, 1), (1.85, 1.85, 1), (1.85, 1.85, 1), (7.0, 7.0, 1)];
+            let bars =
+                (0..100u32).map(|bin| (f64::from(bin), f64::from(bin + 1), 1 + u64::from(bin * 7 % 13))).collect();
+            let (one, slow) = (vec![(50.5, 50.5, 1)], vec![(45_600.0, 45_600.0, 1); SINGLES]);
+            self.distributions.episodes = vec![
+                times(false, "0F04", dots),
+                times(false, "loss", bars),
+                times(true, "0F02", one),
+                times(true, "loss", slow),
+            ];
+        }
         self.distributions.latch_skew = counted("latch skew", "ns", &mut self.skews);
         self.distributions.synch_delay = counted("SYNCH delay", "us", &mut self.delays);
         self.distributions.t_dp_deviation = counted("T_DP deviation", "ns", &mut self.deviations);
@@ -425,13 +447,13 @@ fn words(text: &str) -> String {
 }
 
 /// File; words of the title, axes with units, legend.
-const WORDS: [(&str, &[&str]); 9] = [
+const WORDS: [(&str, &[&str]); 11] = [
     ("latch_skew.svg", &["Latch skew:", "latch skew [ns]", "cycles (logarithmic)", "p99.9 ", "cycles per column"]),
     ("pll_convergence.svg", &["PLL convergence:", "error and window [ns]", "cycles since", "± window", "locked at"]),
     ("t_dp_deviation.svg", &["T_DP deviation:", "T_DP deviation [ns]", "time [", "cycles (logarithmic)", "p99 "]),
     (
         "timeline.svg",
-        &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "telegram disturbed", "slave 3", "LED flashing"],
+        &["Timeline:", "time [", "phase 5 operation", "fault 0F04", "disturbed", "slave 3", "LED flashing"],
     ),
     ("publish_latency.svg", &["Publish latency:", "latency [us]", "Wire:", "Publish:", "Age at use:", "p99.9"]),
     (
@@ -444,6 +466,22 @@ const WORDS: [(&str, &[&str]); 9] = [
         "synch_delay.svg",
         &["SYNCH delay:", "SYNCH delay [us]", "time [", "late SYNCH (logarithmic)", "p99 ", "percentiles"],
     ),
+    (
+        "disturbances.svg",
+        &["Disturbances:", "time [", "PLL error [ns]", "± window", "lost clocks", "DP state", "DATA_EXCH", "phase 5"],
+    ),
+    (
+        "recovery.svg",
+        &[
+            "Recovery:",
+            "time [ms]",
+            "time [s]",
+            "n = 4, median 1.85 ms, max 7 ms",
+            "once, 50.5 ms",
+            "after a loss",
+            "median",
+        ],
+    ),
 ];
 
 #[test]
@@ -452,12 +490,13 @@ fn every_picture_says_what_it_shows_with_units_and_legend() {
     for (name, world) in worlds() {
         let slaves = world.plots.meta.slaves.len();
         let footer = format!("scenario invented-{slaves}, seed 42, T_DP {}", world.plots.meta.t_dp);
-        for ((file, text), (_, expected)) in world.pictures().iter().zip(WORDS) {
+        for (file, text) in &world.pictures() {
+            let (_, expected) = WORDS.iter().find(|entry| entry.0 == *file).expect("a registered picture");
             let words = words(text);
             assert!(words.contains(expected[0]) && words.contains(&footer), "{name} {file}:\n{words}");
             let several = !matches!(*file, "latch_skew.svg" | "publish_latency.svg") || slaves > 1;
             if slaves > 0 && name != "no-cycle" && several {
-                for word in expected {
+                for word in *expected {
                     assert!(words.contains(word), "{name} {file} lacks '{word}':\n{words}");
                 }
             }
@@ -478,9 +517,19 @@ fn a_picture_without_data_says_why_in_a_sentence() {
 fn the_delay_by_the_token_is_drawn_where_there_are_several_masters() {
     let mut world = World::new(1, 200, Span::from_ms(2));
     let has = |world: &World| world.pictures().iter().any(|picture| picture.0 == "synch_delay.svg");
-    assert!(has(&world) && world.plots.files().any(|file| file == "synch_delay.svg"));
+    assert!(has(&world));
     world.plots.meta.masters = 1;
-    assert!(!has(&world) && world.plots.files().all(|file| file != "synch_delay.svg"));
+    assert!(!has(&world));
+}
+
+#[test]
+fn disturbances_are_drawn_where_there_are_any() {
+    for (name, world) in worlds() {
+        let drawn = |file| world.pictures().iter().any(|picture| picture.0 == file);
+        let disturbed = name != "no-cycle";
+        let expected = [disturbed, disturbed];
+        assert_eq!([drawn("disturbances.svg"), drawn("recovery.svg")], expected, "{name}");
+    }
 }
 
 #[test]
@@ -522,8 +571,8 @@ fn the_kept_bus_cycle_has_a_gap_poll_if_one_was_complete() {
 
 #[test]
 fn every_file_of_this_folder_is_registered_or_serves_the_others() {
-    const SERVING: [&str; 10] =
-        ["mod", "plan", "buckets", "chart", "distribution", "lanes", "look", "sweep", "telegrams", "tests"];
+    const SERVING: [&str; 11] =
+        ["mod", "plan", "budget", "buckets", "chart", "distribution", "lanes", "look", "sweep", "telegrams", "tests"];
     let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/study/plot");
     let stem = |path: &Path| path.file_stem().unwrap().to_string_lossy().into_owned();
     let files: BTreeSet<String> = std::fs::read_dir(dir).unwrap().map(|entry| stem(&entry.unwrap().path())).collect();

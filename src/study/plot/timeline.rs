@@ -11,7 +11,7 @@ use super::look::{
     WIDTH, Words, counted, empty_page, lamp, legend, legend_height, page,
 };
 use crate::device::leds::Lamp;
-use crate::observation::{Leds, Observation, Phase, SlaveState};
+use crate::observation::{Disturbance, Leds, Observation, Phase, SlaveState};
 use crate::study::row::{EventRow, SlaveRow};
 
 /// Buckets of the whole run.
@@ -33,15 +33,15 @@ const LIFE_FAULT: u16 = 0x0F02;
 const CLOCK_FAULT: u16 = 0x0F04;
 
 /// What is marked: its words, its colour, and the upper and lower end of the mark in halves of a lane.
-struct Mark {
-    label: &'static str,
+pub(super) struct Mark {
+    pub(super) label: &'static str,
     column: &'static str,
-    colour: RGBColor,
+    pub(super) colour: RGBColor,
     from: i32,
     to: i32,
 }
 
-const MARKS: [Mark; 5] = [
+pub(super) const MARKS: [Mark; 5] = [
     Mark { label: "fault 0F04, clock", column: "0F04", colour: VERMILION, from: 0, to: 2 },
     Mark { label: "fault 0F02, sign of life", column: "0F02", colour: BLACK, from: 0, to: 2 },
     Mark { label: "another fault", column: "other", colour: BLUE, from: 0, to: 2 },
@@ -49,11 +49,10 @@ const MARKS: [Mark; 5] = [
     Mark { label: "fault acknowledged (lower half)", column: "ack", colour: GREEN, from: 1, to: 2 },
 ];
 /// What disturbs the network, one lane each.
-const TROUBLES: [&str; 6] =
-    ["telegram disturbed", "collision", "SYNCH late", "no answer", "sign of life held", "supply off"];
+const TROUBLES: [&str; 6] = ["disturbed", "collision", "SYNCH late", "no answer", "sign of life held", "supply off"];
 
 /// Colour and name of each phase.
-const PHASES: [(Phase, RGBColor); 5] = [
+pub(super) const PHASES: [(Phase, RGBColor); 5] = [
     (Phase::Configuration, RGBColor(0xB8, 0xB8, 0xB8)),
     (Phase::Clock, ORANGE),
     (Phase::MasterLife, RGBColor(0xF0, 0xE4, 0x42)),
@@ -150,6 +149,7 @@ impl Timeline {
     pub(super) fn event(&mut self, slave: Option<usize>, row: &EventRow) {
         self.cycles = self.cycles.max(row.cycle + 1);
         let trouble = match row.what {
+            Observation::Disturbed { how: Disturbance::Ends, .. } => None,
             Observation::Disturbed { .. } => Some(0),
             Observation::Collision { .. } => Some(1),
             Observation::ClockLate { .. } => Some(2),

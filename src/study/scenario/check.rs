@@ -3,6 +3,7 @@
 
 use super::class1;
 use super::class2;
+use super::disturbance;
 use super::error::{Fault, Problem};
 use super::expect;
 use super::gsd;
@@ -10,7 +11,7 @@ use super::section::Reader;
 use super::services;
 use super::topology;
 use super::tree::Place;
-use super::{Action, CodeSequence, Crystal, Extent, LineFault, Link, Run, Sample, Scenario, Slave, What, When};
+use super::{Action, CodeSequence, Crystal, Extent, LineFault, Link, Run, Sample, Scenario, Slave, What, When, Which};
 use crate::device::options::Resolution;
 use crate::sim::motion;
 use crate::study::plan::finding::{Finding, Subject};
@@ -61,12 +62,22 @@ static STAGES: &[Stage] = &[
     Stage::own(&[sample_lengths, destinations, told_lengths]),
     Stage::own(&[gsd::set_prm_length]),
     Stage::own(&[event_stations, class1::event_stations, gsd::acyclic_devices, event_instants]),
-    Stage::own(&[disturbance_stations, services::commands, expect::subjects]),
+    Stage::own(&[
+        disturbance_stations,
+        disturbance::station::are_there,
+        disturbance::application::are_slaves,
+        disturbance::clock::are_crystals,
+        disturbance::token::are_masters,
+        disturbance::path::in_order,
+        disturbance::path::few_cuts,
+        services::commands,
+        expect::subjects,
+    ]),
     Stage { own: &[], planned: &[rules::START_UP] },
 ];
 
 /// Largest offset of a crystal. Model: twice what cheap ones have over temperature and age.
-const CRYSTAL_MAX_PPB: i64 = 200_000;
+pub(super) const CRYSTAL_MAX_PPB: i64 = 200_000;
 
 /// Checks `scenario` stage by stage until one complains, the planner's rules only with [`Check::All`].
 pub(super) fn check(scenario: &Scenario, reader: &mut Reader<'_>, check: Check) -> Vec<Problem> {
@@ -492,12 +503,17 @@ fn event_instants(facts: &Facts<'_>, reader: &mut Reader<'_>) {
 
 fn disturbance_stations(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
-        let What::Line(LineFault::LostTelegrams { from, to, .. }) = &disturbance.what else { continue };
-        for (key, station) in [("from", from), ("to", to)] {
-            if let Some(address) = *station
+        let named = match &disturbance.what {
+            What::Line(LineFault { which: Which { from, to, .. }, .. }) => [("from", *from), ("to", *to)],
+            What::Source(source) => [("near", source.near), ("near", None)],
+            _ => continue,
+        };
+        for (key, station) in named {
+            if let Some(address) = station
                 && address != facts.scenario.master.address
                 && facts.scenario.class1(address).is_none()
                 && facts.scenario.slave(address).is_none()
+                && facts.scenario.class2.iter().all(|class2| class2.address != address)
             {
                 let fault = no_slave(facts, address);
                 about(reader, &format!("disturbance.{}.{key}", i + 1), &[], fault);

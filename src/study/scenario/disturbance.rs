@@ -1,10 +1,19 @@
 //! Disturbances: the tables `[[disturbance]]`, each with a kind, a name and a window. A new kind is a line of the
 //! registry and a row beside the kinds of its family.
 
+pub(super) mod application;
+pub(super) mod clock;
+mod gc_jitter;
 mod line;
+mod manner;
+pub(super) mod path;
+mod source;
+pub(super) mod station;
+pub(super) mod token;
+pub mod which;
 
 use super::error::Fault;
-use super::section::{Reader, Section, choice, instant, number, text};
+use super::section::{Reader, Section, choice, instant, number, suggestion, text};
 use super::tree::{Node, Value};
 use crate::sim::fault::window::{Bursts, Window};
 use crate::sim::fault::{Disturbance, What};
@@ -39,7 +48,33 @@ pub struct Key {
 }
 
 /// Every kind.
-pub const DISTURBANCES: &[DisturbanceKind] = &[line::MISSING_CLOCKS, line::LOST_TELEGRAMS];
+pub const DISTURBANCES: &[DisturbanceKind] = &[
+    line::MISSING_CLOCKS,
+    line::LOST_TELEGRAMS,
+    line::LATE_TELEGRAMS,
+    line::DUPLICATE_TELEGRAMS,
+    line::BIT_ERRORS,
+    line::WRONG_OCTET,
+    source::NOISE,
+    source::FOREIGN_TELEGRAM,
+    token::LATE_TOKEN,
+    station::SILENT,
+    station::MUTE,
+    station::DEAF,
+    station::RESTART,
+    gc_jitter::GC_JITTER,
+    clock::CRYSTAL_OFFSET,
+    clock::CRYSTAL_WANDER,
+    clock::TEMPERATURE_STEP,
+    path::RECEIVER_JITTER,
+    path::REPEATER_JITTER,
+    path::T_SDR_JITTER,
+    path::CABLE_CUT,
+    application::HOLD_LIFE_SIGN,
+    application::JUMP_LIFE_SIGN,
+    application::REPEAT_LIFE_SIGN,
+    application::WRONG_PARAMETERS,
+];
 
 /// The keys of every disturbance.
 pub const COMMON: &[Key] = &[
@@ -50,7 +85,12 @@ pub const COMMON: &[Key] = &[
         what: "what lists and pictures call it; its draws hang on it",
     },
     Key { name: "at", unit: "time", default: "the start", what: "when it begins; either this or cycle" },
-    Key { name: "cycle", unit: "cycle", default: "the start", what: "in which cycle it begins; either this or at" },
+    Key {
+        name: "cycle",
+        unit: "cycle",
+        default: "the start",
+        what: "in which cycle of [master] it begins; either this or at",
+    },
     Key {
         name: "for",
         unit: "time or cycles",
@@ -160,29 +200,73 @@ fn extent(axis: Axis, least: i64, node: &Node) -> Result<i64, Fault> {
     }
 }
 
+/// A kind of disturbance that does not exist was asked for.
+#[derive(Debug, thiserror::Error)]
+#[error("there is no disturbance \"{name}\"; {help}")]
+pub struct UnknownDisturbance {
+    name: String,
+    help: String,
+}
+
 /// Every kind with its keys and an example, as text.
 pub fn list() -> String {
-    let rows = |keys: &[Key]| {
-        let row = |key: &Key| [key.name, key.unit, key.default, key.what].map(str::to_owned).to_vec();
-        keys.iter().map(row).collect::<Vec<_>>()
-    };
-    let header = ["  key", "value", "default", "meaning"];
-    let table = |keys: &[Key]| {
-        let mut rows = rows(keys);
-        for row in &mut rows {
-            row[0].insert_str(0, "  ");
-        }
-        aligned(&header, &[0, 1, 2, 3], &rows)
-    };
-    let mut lines = vec!["every disturbance: a table [[disturbance]] with its kind and".to_owned()];
-    lines.extend(table(COMMON));
+    let mut lines = common();
     for kind in DISTURBANCES {
-        lines.extend([String::new(), format!("{}: {}", kind.name, kind.what)]);
-        if !kind.keys.is_empty() {
-            lines.extend(table(kind.keys));
-        }
-        lines.push(format!("  example: disturbance = [{{ {} }}]", kind.example));
+        lines.push(String::new());
+        lines.extend(about(kind));
     }
+    if DISTURBANCES.iter().any(names_services) {
+        lines.extend(services());
+    }
+    page(&lines)
+}
+
+/// One kind with its keys, those of every disturbance and an example, as text.
+///
+/// # Errors
+/// There is no such kind.
+pub fn full(name: &str) -> Result<String, UnknownDisturbance> {
+    let Some(kind) = DISTURBANCES.iter().find(|kind| kind.name == name) else {
+        let help = suggestion(name, DISTURBANCES.iter().map(|kind| kind.name));
+        return Err(UnknownDisturbance { name: name.chars().take(40).collect(), help });
+    };
+    let mut lines = about(kind);
+    lines.push(String::new());
+    lines.extend(common());
+    if names_services(kind) {
+        lines.extend(services());
+    }
+    Ok(page(&lines))
+}
+
+fn page(lines: &[String]) -> String {
     let lines: Vec<_> = lines.iter().map(|line| line.trim_end()).collect();
     lines.join("\n") + "\n"
+}
+fn table(keys: &[Key]) -> Vec<String> {
+    let row =
+        |key: &Key| vec![format!("  {}", key.name), key.unit.to_owned(), key.default.to_owned(), key.what.to_owned()];
+    aligned(&["  key", "value", "default", "meaning"], &[0, 1, 2, 3], &keys.iter().map(row).collect::<Vec<_>>())
+}
+fn common() -> Vec<String> {
+    let mut lines = vec!["every disturbance: a table [[disturbance]] with its kind and".to_owned()];
+    lines.extend(table(COMMON));
+    lines
+}
+fn about(kind: &DisturbanceKind) -> Vec<String> {
+    let mut lines = vec![format!("{}: {}", kind.name, kind.what)];
+    if !kind.keys.is_empty() {
+        lines.extend(table(kind.keys));
+    }
+    lines.push(format!("  example: disturbance = [{{ {} }}]", kind.example));
+    lines
+}
+fn names_services(kind: &DisturbanceKind) -> bool {
+    kind.keys.iter().any(|key| key.name == which::SERVICE.name)
+}
+fn services() -> Vec<String> {
+    let rows: Vec<_> = which::SERVICES.iter().map(|row| vec![format!("  {}", row.name), row.what.to_owned()]).collect();
+    let mut lines = vec![String::new(), "services".to_owned()];
+    lines.extend(aligned(&["  service", "which telegrams"], &[0, 1], &rows));
+    lines
 }

@@ -1,6 +1,7 @@
 //! Tests: what good files become, and what each mistake in a file is answered with.
 
 use super::*;
+use crate::sim::fault::manner::Manner;
 use crate::sim::motion::Angle;
 use crate::study::scenario::disturbance::DISTURBANCES;
 use crate::time::BitRate;
@@ -920,7 +921,8 @@ fn a_good_file_becomes_a_scenario() {
     let action = Action::HoldLifeSign { cycles: Some(2) };
     assert_eq!(scenario.events, [Event { when: When::Time(Span::from_s(1)), slaves: vec![publisher], action }]);
     let window = Window::Cycles(Bursts { from: 1_000, length: Some(1), every: Some(100), times: None });
-    let what = What::Line(LineFault::MissingClocks);
+    let which = Which::all(Service::Only(crate::sim::fault::which::Kind::Synch));
+    let what = What::Line(LineFault { which, manner: Manner::All, effect: Effect::Lost });
     assert_eq!(scenario.disturbances, [Disturbance { name: "missing-clocks".to_owned(), window, what }]);
     assert_eq!(scenario.record.tables, [CsvTable::Cycles, CsvTable::Slaves, CsvTable::Events]);
     assert!(scenario.publishes(publisher) && !scenario.publishes(subscriber));
@@ -974,8 +976,8 @@ fn every_kind_can_be_read() {
         let scenario = good(&[("slave.3.motion", &table)]);
         assert!(format!("{:?}", scenario.slaves[0].motion).to_lowercase().starts_with(kind.name));
     }
-    for kind in crate::sim::noise::KINDS {
-        let values = kind.parameters.iter().map(|key| format!(", {key} = \"1 us\"")).collect::<Vec<_>>().concat();
+    for kind in crate::sim::jitter::KINDS {
+        let values = kind.keys.iter().map(|(key, example)| format!(", {key} = {example}")).collect::<Vec<_>>().concat();
         let scenario = good(&[("master.gc_jitter", &format!("{{ kind = \"{}\"{values} }}", kind.name))]);
         assert_eq!(scenario.master.gc_jitter.kind(), kind);
     }
@@ -1004,12 +1006,22 @@ fn every_kind_can_be_read() {
     }
 }
 
+/// The same network in two halls.
+fn with_a_repeater(text: &str) -> String {
+    let halls = "[[segment]]\nname = \"hall 1\"\ncable = \"50 m\"\n[[segment]]\nname = \"hall 2\"\ncable = \"50 m\"\n\
+                 [[repeater]]\nfrom = \"hall 1\"\nto = \"hall 2\"\n";
+    let text =
+        text.replace("cable = \"100 m\"\n", halls).replace("address = 2\n", "address = 2\nsegment = \"hall 1\"\n");
+    text.replace("\ndevice =", "\nsegment = \"hall 2\"\ndevice =")
+}
+
 #[test]
 fn every_disturbance_can_be_written_as_its_example_says() {
     let end = GOOD.find("[[disturbance]]").unwrap();
     let rest = &GOOD[GOOD.find("[record]").unwrap()..];
     for kind in DISTURBANCES {
         let text = format!("disturbance = [{{ {} }}]\n{}{rest}", kind.example, &GOOD[..end]);
+        let text = if kind.keys.iter().any(|key| key.name == "repeater") { with_a_repeater(&text) } else { text };
         let scenario = parse(&text, &[]).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(scenario.disturbances[0].name, kind.name);
         let unread = kind.keys.iter().filter(|key| key.name.contains(' ')).count();
@@ -1086,6 +1098,55 @@ good.toml:49:8: disturbance.2.name: two disturbances are called "x"
 "#,
         ),
     ]);
+}
+
+/// What is said of a disturbance with these keys in the place of that of the good file, without the lines that show it.
+fn said_of_disturbance(keys: &str) -> String {
+    let begin = GOOD.find("kind = \"missing-clocks\"").unwrap();
+    let end = GOOD.find("\n[record]").unwrap();
+    let text = [&GOOD[..begin], keys, "\n", &GOOD[end..]].concat();
+    match parse(&text, &[]) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("nothing is said of {keys}"),
+    }
+}
+
+#[test]
+fn disturbances_of_the_line_that_cannot_be() {
+    for (keys, expected) in [
+        ("kind = \"lost-telegrams\"\nrate = \"1 %\"\ntelegrams = 3", "rate, telegrams and pattern exclude each other"),
+        ("kind = \"lost-telegrams\"\nrate = \"101 %\"", "is beyond the range of a share, 0 to 1"),
+        ("kind = \"lost-telegrams\"\npattern = \"xo\"", "1 to 64 characters, x for a telegram that is meant"),
+        ("kind = \"lost-telegrams\"\nservice = \"tokens\"", "did you mean \"token\"?"),
+        ("kind = \"late-telegrams\"", "late either by a time or by anything up to a time"),
+        (
+            "kind = \"late-telegrams\"\nby = \"1 us\"\nup_to = \"1 us\"",
+            "late either by a time or by anything up to a time",
+        ),
+        ("kind = \"late-telegrams\"\nby = \"-1 us\"", "-1 us is negative"),
+        ("kind = \"bit-errors\"", "for example: rate = \"1e-6\""),
+        ("kind = \"bit-errors\"\nrate = \"1e-16\"", "is not a whole number of parts in 10^15"),
+        ("kind = \"wrong-octet\"", "disturbance.1.octet: this key is missing"),
+        ("kind = \"wrong-octet\"\noctet = 0", "0 is out of range"),
+        ("kind = \"wrong-octet\"\noctet = 8\nflip = 0", "a whole number from 1 to 255"),
+        ("kind = \"wrong-octet\"\noctet = 8\nparity = \"bad\"", "there is no parity \"bad\""),
+        ("kind = \"noise\"\nmean = \"0 us\"", "noise that never pauses is no noise"),
+        ("kind = \"noise\"\noctets = 4\noctets_to = 3", "a whole number from 4 to 255"),
+        ("kind = \"noise\"\nnear = 77", "disturbance.1.near: there is no slave 77"),
+        ("kind = \"foreign-telegram\"", "given by octets, token or data, and by one of them only"),
+        ("kind = \"foreign-telegram\"\noctets = \"DC 2\"\ntoken = { to = 2, from = 5 }", "by one of them only"),
+        ("kind = \"foreign-telegram\"\noctets = \"DC 102 5\"", "1 to 255 octets in hexadecimal"),
+        ("kind = \"foreign-telegram\"\noctets = \"\"", "these are no octets of a telegram"),
+        ("kind = \"foreign-telegram\"\ntoken = { to = 2 }", "token.from: this key is missing"),
+        ("kind = \"foreign-telegram\"\ntoken = { to = 200, from = 5 }", "a whole number from 0 to 127"),
+        ("kind = \"foreign-telegram\"\ndata = { to = 2, from = 5, fc = 0x41 }", "frame control 41 is not assigned"),
+        ("kind = \"foreign-telegram\"\ndata = { to = 2, from = 5, sap = 60 }", "did you mean \"dsap\"?"),
+        ("kind = \"late-token\"\nstation = 3\nby = \"1 us\"", "station 3 is a slave"),
+        ("kind = \"late-token\"\nstation = 2", "for example: by = \"200 us\""),
+    ] {
+        let said = said_of_disturbance(keys);
+        assert!(said.contains(expected), "{keys}\n{said}");
+    }
 }
 
 #[test]

@@ -6,9 +6,8 @@ use super::services::command;
 use super::tree::{Node, Value};
 use super::{Action, Format, Patch, StartupTelegram};
 use crate::sim::motion::{Angle, Motion, Shaft};
-use crate::sim::noise::{GcJitter, KINDS as JITTERS};
 use crate::study::quantity::{angle, micro_rpm};
-use crate::time::{Span, Time};
+use crate::time::Time;
 use crate::wire::Address;
 use crate::wire::control::GlobalControl;
 
@@ -167,26 +166,6 @@ pub(super) fn motion(mut section: Section<'_>, reader: &mut Reader<'_>) -> Optio
     Some(motion)
 }
 
-/// Reads the jitter of SYNCH, and whether it accumulates (Model: D1).
-pub(super) fn gc_jitter(mut section: Section<'_>, reader: &mut Reader<'_>) -> Option<(GcJitter, bool)> {
-    let name = |node: &Node| choice(node, "jitter", JITTERS, |kind| kind.name);
-    let kind = section.required(reader, "kind", "\"bounded-normal\"", name)?;
-    let mut values = kind.parameters.iter().map(|key| section.required(reader, key, "\"100 ns\"", instant));
-    let (first, second) = (values.next().flatten(), values.next().flatten());
-    let jitter = match kind.name {
-        "none" => Some(GcJitter::None),
-        "uniform" => first.map(|half_width| GcJitter::Uniform { half_width }),
-        "normal" => first.map(|sigma| GcJitter::Normal { sigma }),
-        _ => first.zip(second).map(|(sigma, bound)| GcJitter::BoundedNormal { sigma, bound }),
-    };
-    if let Some(Err(error)) = jitter.map(|jitter| jitter.check()) {
-        section.complain(reader, Fault::new(error.to_string()));
-    }
-    let accumulate = section.optional(reader, "accumulate", super::section::yes).unwrap_or(false);
-    section.finish(reader);
-    Some((jitter?, accumulate))
-}
-
 #[expect(clippy::unnecessary_wraps, reason = "the signature of all kinds")]
 fn hold_life_sign(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Action> {
     Some(Action::HoldLifeSign { cycles: section.optional(reader, "for", number(1..=u32::MAX)) })
@@ -213,11 +192,15 @@ fn change_parameter(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Optio
 }
 #[expect(clippy::unnecessary_wraps, reason = "the signature of all kinds")]
 fn startup(telegram: StartupTelegram, section: &mut Section<'_>, reader: &mut Reader<'_>) -> Option<Action> {
+    Some(Action::Startup { telegram, patch: patch(section, reader) })
+}
+/// What is changed in a telegram of the start-up.
+pub(super) fn patch(section: &mut Section<'_>, reader: &mut Reader<'_>) -> Patch {
     let mut patch = section.optional(reader, "octets", octets).unwrap_or_default();
     if let Some(length) = section.optional(reader, "length", number(0..=244u8)) {
         patch.set_length(length);
     }
-    Some(Action::Startup { telegram, patch })
+    patch
 }
 /// Pairs of an octet's number, from 1, and its value.
 fn octets(node: &Node) -> Result<Patch, Fault> {
@@ -238,14 +221,4 @@ fn octets(node: &Node) -> Result<Patch, Fault> {
 pub(super) fn address(node: &Node) -> Result<Address, Fault> {
     number(0..=125u8)(node)
         .and_then(|number| Address::new(number).ok_or_else(|| Fault::new(format!("{number} is no address"))))
-}
-
-/// The largest stray of `jitter`, if it has a bound.
-pub(in crate::study) const fn jitter_bound(jitter: GcJitter) -> Option<Span> {
-    match jitter {
-        GcJitter::None => Some(Span::ZERO),
-        GcJitter::Uniform { half_width } => Some(half_width),
-        GcJitter::Normal { .. } => None,
-        GcJitter::BoundedNormal { bound, .. } => Some(bound),
-    }
 }

@@ -6,11 +6,13 @@ use super::class2;
 use super::disturbance;
 use super::error::Fault;
 use super::expect;
+use super::flight;
 use super::gsd;
+use super::jitter;
 use super::kinds::{self, ACTIONS, Kind, address};
 use super::link::link;
 use super::options;
-use super::section::{Reader, Section, cycle_time, instant, number, quantity, suggestion, text, yes};
+use super::section::{Around, Reader, Section, cycle_time, instant, number, quantity, suggestion, text, yes};
 use super::services;
 use super::topology::{self, cable, spread, station_segment};
 use super::tree::{Node, Place, Table, Value};
@@ -21,8 +23,9 @@ use super::{
 use crate::device::profile::Profile;
 use crate::dp::master::Pace;
 use crate::fdl::params::BusParams;
+use crate::sim::jitter::GcJitter;
 use crate::sim::motion::{Angle, Motion};
-use crate::sim::noise::GcJitter;
+use crate::study::invocation::Invocation;
 use crate::study::plan::Plan;
 use crate::study::quantity::{bit_rate, ppb, tbit};
 use crate::time::{BitRate, Span, Tbit};
@@ -90,6 +93,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses, topology.as_ref()));
     let links = list(reader, &root, "link", link);
     let events = list(reader, &root, "event", |section, reader| event(section, reader, &addresses));
+    reader.around = Around { slaves: addresses, topology: topology.clone(), rate };
     let disturbances = disturbances(reader, &root);
     let record = record(Section::of_file(reader, &root, "record"), reader);
     let expectations = expect::read(reader, &root, rate);
@@ -107,6 +111,7 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         events,
         disturbances,
         record,
+        invocation: Invocation::default(),
         expectations,
     };
     if scenario.master.pace != Pace::Synch {
@@ -210,7 +215,7 @@ fn addresses_of(reader: &mut Reader<'_>, section: &mut Section<'_>) -> Vec<(Addr
 }
 
 /// Addresses, `3`, `"3..5, 9"` or `[3, 4, 9]`, in order and each once.
-fn address_list(node: &Node) -> Result<Vec<Address>, Fault> {
+pub(super) fn address_list(node: &Node) -> Result<Vec<Address>, Fault> {
     let bad = |part: &str| {
         Fault::new(format!("\"{part}\" is no address and no range of addresses"))
             .help("addresses are 0 to 125; a range is written \"3..10\" and includes both ends")
@@ -429,7 +434,7 @@ fn master(
     let position_mm = s.optional(reader, "position", cable).unwrap_or(0);
     let jitter = s.table(reader, "gc_jitter");
     let (gc_jitter, accumulate) =
-        jitter.and_then(|inner| kinds::gc_jitter(inner, reader)).unwrap_or((GcJitter::None, false));
+        jitter.and_then(|inner| jitter::of_master(inner, reader)).unwrap_or((GcJitter::None, false));
     let life_start = s.optional(reader, "life_start", number(1..=15)).unwrap_or(1);
     let life_delay = s.optional(reader, "life_delay", number(0..=u32::MAX)).unwrap_or(0);
     let active_spare = s.optional(reader, "active_spare", yes).unwrap_or(false);
@@ -697,6 +702,7 @@ fn record(mut section: Section<'_>, reader: &mut Reader<'_>) -> Record {
     let tables = CsvTable::ALL.iter().filter(|&&(key, _)| flag(key)).map(|&(_, table)| table).collect();
     let (files, plots) = (flag("files"), flag("plots"));
     let rows = section.optional(reader, "rows", number(1..=i64::MAX as u64)).unwrap_or(20_000);
+    let flight = flight::read(section.table(reader, "flight"), reader);
     section.finish(reader);
-    Record { files, plots, tables, rows }
+    Record { files, plots, tables, rows, flight }
 }

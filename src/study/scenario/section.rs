@@ -2,9 +2,11 @@
 
 use super::Run;
 use super::error::{Fault, Problem};
+use super::topology::Topology;
 use super::tree::{Node, Place, Source, Table, Value};
 use crate::study::quantity::{QuantityError, span};
 use crate::time::{BitRate, Span};
+use crate::wire::Address;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -18,13 +20,30 @@ pub(in crate::study) struct Reader<'a> {
     pub(super) gsd_files: super::gsd::Files,
     /// Whether T_DP, T_I and T_O may be missing: they are to be proposed.
     pub(in crate::study) proposes: bool,
+    /// What disturbances can be about.
+    pub(super) around: Around,
     problems: Vec<(Place, String, Fault)>,
+}
+
+/// What of a scenario is known when its disturbances are read.
+pub(super) struct Around {
+    /// Addresses of all slaves, in order.
+    pub(super) slaves: Vec<Address>,
+    pub(super) topology: Option<Topology>,
+    pub(super) rate: BitRate,
 }
 
 impl<'a> Reader<'a> {
     /// A reader of `source` that has read nothing yet.
     pub(in crate::study) const fn new(source: &'a Source<'a>) -> Self {
-        Self { source, places: BTreeMap::new(), gsd_files: BTreeMap::new(), proposes: false, problems: Vec::new() }
+        Self {
+            source,
+            places: BTreeMap::new(),
+            gsd_files: BTreeMap::new(),
+            proposes: false,
+            around: Around { slaves: Vec::new(), topology: None, rate: BitRate::M12 },
+            problems: Vec::new(),
+        }
     }
     /// Notes that `key` at `place` is wrong. The same fault of the same value, shared by several slaves, is noted once.
     pub(in crate::study) fn complain(&mut self, place: Place, key: &str, fault: Fault) {

@@ -15,6 +15,10 @@ use super::confidence::Confidence;
 use super::interval::Interval;
 use super::student::student_quantile;
 
+/// Most values that a text is believed to be of: thousands of such parts merge before a count is full.
+/// Model: 2^53, the largest count that other readers of JSON keep exact.
+pub(super) const MOST_WRITTEN: u64 = 1 << 53;
+
 /// What tells one run of a study from all others: a hash of all that it depends on.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub struct RunKey(pub u128);
@@ -197,7 +201,7 @@ impl Aggregate {
         let times = |value: i64| i128::from(value) * i128::from(self.count);
         // No product can overflow: the sum is checked first, and no square is above that of the farthest value.
         let farthest = U256::from(min.unsigned_abs().max(max.unsigned_abs()));
-        self.count > 0
+        (1..=MOST_WRITTEN).contains(&self.count)
             && (times(min)..=times(max)).contains(&self.sum)
             && self.squares <= farthest * farthest * U256::from(self.count)
             && self.squares * U256::from(self.count) >= U256::new(self.sum.unsigned_abs()).pow(2)

@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::aggregate::MOST_WRITTEN;
+
 /// Leading bits of a value that are kept.
 const BITS: u32 = 11;
 
@@ -88,7 +90,7 @@ impl TryFrom<BTreeMap<i64, u64>> for Bins {
     fn try_from(counts: BTreeMap<i64, u64>) -> Result<Self, BinsError> {
         let mut total = 0u64;
         for (&edge, &count) in &counts {
-            let sum = total.checked_add(count).filter(|_| count > 0 && edges(edge).0 == edge);
+            let sum = total.checked_add(count).filter(|&sum| count > 0 && sum <= MOST_WRITTEN && edges(edge).0 == edge);
             total = sum.ok_or(BinsError { edge, count })?;
         }
         Ok(Self { counts })
@@ -122,7 +124,9 @@ mod tests {
     #[test]
     fn text_is_exact_and_bins_that_are_none_are_refused() {
         let mut bins = Bins::default();
-        [-17, -17, 2_049, i64::MIN].into_iter().for_each(|value| bins.add(value));
+        for value in [-17, -17, 2_049, i64::MIN] {
+            bins.add(value);
+        }
         let json = serde_json::to_string(&bins).unwrap();
         assert_eq!(json, "{\"-9223372036854775808\":1,\"-17\":2,\"2048\":1}");
         assert_eq!(serde_json::from_str::<Bins>(&json).unwrap(), bins);

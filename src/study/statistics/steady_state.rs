@@ -114,7 +114,9 @@ mod tests {
 
     fn watch(settled_after: u64, slaves: usize, told: &[(u64, usize, Condition, bool)]) -> SteadyWatch {
         let mut watch = SteadyWatch::new(100, settled_after, slaves);
-        told.iter().for_each(|&(cycle, slave, condition, holds)| watch.note(cycle, slave, condition, holds));
+        for &(cycle, slave, condition, holds) in told {
+            watch.note(cycle, slave, condition, holds);
+        }
         watch
     }
 

@@ -129,9 +129,11 @@ impl Comparison {
             (Value::Share(limit), Value::Share(value)) => Margin::Share(limit - value),
             _ => return None,
         };
+        let value_is_limit = value.compare(self.limit) == Some(Ordering::Equal);
         match self.relation {
             Relation::Below | Relation::AtMost => Some(room),
             Relation::Above | Relation::AtLeast => Some(room.turned()),
+            Relation::Equal if value_is_limit => None,
             Relation::Equal => Some(if room.is_negative() { room } else { room.turned() }),
             Relation::Unequal => None,
         }
@@ -323,7 +325,7 @@ mod tests {
         assert_eq!(of("> -500 ns", Unit::Ns, ns(-400)), some("100 ns", Some(20.0)));
         assert_eq!(of("== 0", Unit::Count, Value::Count(3)), some("-3", None));
         assert_eq!(of("== 5", Unit::Count, Value::Count(3)), some("-2", Some(-40.0)));
-        assert_eq!(of("== 5", Unit::Count, Value::Count(5)), some("0", Some(0.0)));
+        assert_eq!(of("== 5", Unit::Count, Value::Count(5)), None, "as it should be, and no room at all");
         assert_eq!(of("!= 0", Unit::Count, Value::Count(5)), None);
         assert_eq!(of("<= 0.5 steps", Unit::Steps, Value::Steps(0.25)), some("0.250 steps", Some(50.0)));
         assert_eq!(of(">= 99 %", Unit::Share, Value::Share(0.99)), some("0.000 %", Some(0.0)));

@@ -9,6 +9,7 @@
 //! Verdicts come after the fingerprints of a run and change none of them.
 
 pub mod demand;
+pub mod junit;
 pub mod page;
 
 pub use demand::{Comparison, Demand, Margin, Relation};
@@ -139,7 +140,7 @@ struct Written<'a> {
 enum Number {
     Count(u64),
     Truth(bool),
-    Number(f64),
+    Decimal(f64),
 }
 
 impl Serialize for Verdict {
@@ -147,7 +148,7 @@ impl Serialize for Verdict {
         let number = |value: Value| match value {
             Value::Count(count) => Number::Count(count),
             Value::Truth(truth) => Number::Truth(truth),
-            value => Number::Number(value.number(self.unit)),
+            value => Number::Decimal(value.number(self.unit)),
         };
         let written = Written {
             figure: &self.figure,

@@ -5,7 +5,7 @@
 //! SYNCH, just before the cycle begins.
 
 use crate::device::node::Node;
-use crate::observation::Observation;
+use crate::observation::{Disturbance, Observation};
 use crate::sim::network::{Network, NetworkEvent, Until};
 use crate::sim::queue::Queue;
 use crate::sim::record::{Recorder, Stamp, Transmission};
@@ -35,7 +35,7 @@ impl Recorder for Scout {
         match what {
             _ if stamp.station != self.master => {}
             // A SYNCH that the scenario takes away is never a telegram.
-            Observation::Disturbed { .. } => self.sent = Some(None),
+            Observation::Disturbed { how: Disturbance::Lost, .. } => self.sent = Some(None),
             Observation::CycleStart { .. } => self.begun = Some(stamp.at),
             _ => {}
         }

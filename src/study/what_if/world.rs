@@ -12,12 +12,11 @@
 //! ```
 
 use crate::device::node::Node;
-use crate::sim::fault::Faults;
 use crate::sim::motion::Shaft;
 use crate::sim::network::{Network, NetworkEvent};
 use crate::sim::queue::Queue;
 use crate::study::build;
-use crate::study::scenario::{Event, Scenario, When};
+use crate::study::scenario::{Disturbance, Event, Scenario, What, When};
 use crate::time::Time;
 
 /// The keys that can change, for messages.
@@ -27,7 +26,7 @@ pub(super) const KEYS: &str = "master.gc_jitter, crystal (of master, slave.N, cl
 /// `altered` with the world of `original`: where it is not `original`, something else differs.
 fn in_the_old_world(original: &Scenario, altered: &Scenario) -> Scenario {
     let mut other = altered.clone();
-    other.master.gc_jitter = original.master.gc_jitter;
+    other.master.gc_jitter.clone_from(&original.master.gc_jitter);
     other.master.crystal = original.master.crystal;
     for (slave, old) in other.slaves.iter_mut().zip(&original.slaves) {
         slave.crystal = old.crystal;
@@ -48,7 +47,16 @@ fn in_the_old_world(original: &Scenario, altered: &Scenario) -> Scenario {
 
 /// Whether a network of `original` that runs can become one of `altered`.
 pub(super) fn can_change(original: &Scenario, altered: &Scenario) -> bool {
-    in_the_old_world(original, altered) == *original
+    // What a repeater may add, and where a cable may be cut, is part of the paths.
+    let paths = |scenario: &Scenario| -> Vec<Disturbance> {
+        scenario
+            .disturbances
+            .iter()
+            .filter(|disturbance| matches!(disturbance.what, What::Repeater(..) | What::Cut(_)))
+            .cloned()
+            .collect()
+    };
+    in_the_old_world(original, altered) == *original && paths(altered) == paths(original)
 }
 
 /// Those of `events` that have not come at `now`, before `cycle` begins.
@@ -74,10 +82,11 @@ pub(super) fn same_past(original: &Scenario, altered: &Scenario, now: Time, cycl
 /// If a scenario breaks a rule that reading it checks.
 pub(super) fn change_line<Q: Queue<NetworkEvent>>(network: &mut Network<Node, Q>, [original, altered]: [&Scenario; 2]) {
     if altered.master.gc_jitter != original.master.gc_jitter {
-        network.change_jitter(altered.master.gc_jitter).expect("a checked jitter");
+        network.change_jitter(altered.master.gc_jitter.clone()).expect("a checked jitter");
     }
     if altered.disturbances != original.disturbances {
-        network.set_faults(Faults::new(&altered.disturbances));
+        network.set_faults(build::faults(altered));
+        build::order_disturbances(network, altered);
     }
 }
 

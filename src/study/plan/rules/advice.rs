@@ -41,7 +41,7 @@ pub(super) fn window_is_taken(facts: &Facts<'_>, found: &mut Findings) {
 
 /// One SYNCH may be early and the next late: the loop follows the mean of both.
 pub(super) fn jitter_within_window(facts: &Facts<'_>, found: &mut Findings) {
-    let Some((stray, words)) = stray(facts.scenario.master.gc_jitter) else { return };
+    let Some((stray, words)) = stray(&facts.scenario.master.gc_jitter) else { return };
     for slave in facts.clocked() {
         let (t_pll_w, twice) = (slave.times.t_pll_w, stray * 2);
         let key = Key::slave(slave.address, "t_pll_w");

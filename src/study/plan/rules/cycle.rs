@@ -1,6 +1,8 @@
 //! Rules of the bus cycle and of the master.
 
 use super::{Facts, Findings, neighbours, shortest_t_dp, stray};
+use crate::sim::fault::What;
+use crate::sim::fault::window::{Bursts, Window};
 use crate::study::build;
 use crate::study::plan::Plan;
 use crate::study::plan::finding::{Amount, Key, Relation};
@@ -150,13 +152,33 @@ pub(super) fn jitter_fits(facts: &Facts<'_>, found: &mut Findings) {
     let spare = if master.active_spare { spare.min(bus.span(bus.t_id1())) } else { spare };
     // A stray to the one side follows a stray to the other; accumulating, each one counts from the last.
     let (times, terms) = if master.accumulate { (1, "spare time") } else { (2, "spare time / 2") };
-    let Some((stray, words)) = stray(master.gc_jitter) else { return };
+    let (stray, words) = match (stray(&master.gc_jitter), disturbed_strays(facts)) {
+        (None, Span::ZERO) => return,
+        (Some(own), Span::ZERO) => own,
+        (None, disturbed) => (disturbed, "the bounds of disturbances"),
+        (Some((own, _)), disturbed) => (own + disturbed, "with the bounds of disturbances"),
+    };
     let most = Span::from_ticks(spare.ticks().div_euclid(times));
     found.check(Key::master("gc_jitter"), stray, Relation::AtMost, (terms, most), || {
         Fault::new(format!("jitter of {stray} ({words}) does not fit into the spare time of {spare}"))
             .rule(format!("{times} x {stray} <= T_DP {} - cycle {} (Model: D1, D6)", master.t_dp, facts.plan.content()))
             .help(format!("at most {}, or a longer t_dp", Span::from_us(spare.div_floor(Span::from_us(times)))))
     });
+}
+
+/// The sum of the largest strays of all disturbances of SYNCH that have a bound.
+fn disturbed_strays(facts: &Facts<'_>) -> Span {
+    let bounds = facts.scenario.disturbances.iter().filter_map(|disturbance| match &disturbance.what {
+        What::Clock(jitter, false) => jitter.bound(),
+        // Strays that add up have a bound where so many clocks have one.
+        What::Clock(jitter, true) => {
+            let Window::Cycles(Bursts { length: Some(cycles), .. }) = disturbance.window else { return None };
+            jitter.bound()?.ticks().checked_mul(cycles).map(Span::from_ticks)
+        }
+        _ => None,
+    });
+    // No spare time is as long as a second.
+    bounds.fold(Span::ZERO, |sum, bound| sum + bound.min(Span::from_s(1)))
 }
 
 /// A slave that starts up, or comes back, does so while the others exchange data.
