@@ -382,6 +382,23 @@ fn broken_expectations_are_told_of_each_run() {
     }
     let broken: Vec<_> = table(&room.path("out/jitter/summary.csv")).iter().map(|row| row["broken"].clone()).collect();
     assert_eq!(broken, ["0", "3", "0", "3"]);
+    let page = room.runs(&["sweep", "jitter.toml"]);
+    assert!(page.contains("\n0 runs done now, 12 before, 0 failed\n"), "{page}");
+}
+
+#[test]
+fn whatever_a_scenario_says_its_runs_are_known_again() {
+    let room = Room::new();
+    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    for name in ["reference", "gsd-device", "gc-loss", "two-masters", "repeaters", "dxb-network"] {
+        let base = scenarios.join(format!("{name}.toml"));
+        let text = format!("base = {base:?}\nfigures = [\"cycles\"]\n");
+        room.write("one.toml", text);
+        let plan = || room.runs(&["sweep", "one.toml", "--plan"]);
+        let [first, second] = [plan(), plan()];
+        assert!(first.contains(" to do "), "{first}");
+        assert_eq!(first, second, "{name}");
+    }
 }
 
 #[test]

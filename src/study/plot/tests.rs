@@ -571,8 +571,20 @@ fn the_kept_bus_cycle_has_a_gap_poll_if_one_was_complete() {
 
 #[test]
 fn every_file_of_this_folder_is_registered_or_serves_the_others() {
-    const SERVING: [&str; 11] =
-        ["mod", "plan", "budget", "buckets", "chart", "distribution", "lanes", "look", "sweep", "telegrams", "tests"];
+    const SERVING: [&str; 12] = [
+        "mod",
+        "plan",
+        "budget",
+        "buckets",
+        "chart",
+        "distribution",
+        "futures",
+        "lanes",
+        "look",
+        "sweep",
+        "telegrams",
+        "tests",
+    ];
     let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/study/plot");
     let stem = |path: &Path| path.file_stem().unwrap().to_string_lossy().into_owned();
     let files: BTreeSet<String> = std::fs::read_dir(dir).unwrap().map(|entry| stem(&entry.unwrap().path())).collect();

@@ -97,6 +97,7 @@ fn words(panic: &(dyn Any + Send)) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::sweep::definition::Expect;
     use crate::study::sweep::journal::Journal;
     use crate::study::sweep::plan::Fate;
 
@@ -104,7 +105,7 @@ mod tests {
         t_i = \"125 us\"\nt_o = \"500 us\"\n[[slave]]\naddress = 3\ndevice = \"posital-ocd-dpb1b\"\n";
 
     fn base(text: &str) -> Base {
-        Base { name: "scene".to_owned(), source: "scene.toml".to_owned(), text: text.to_owned() }
+        Base { name: "scene".to_owned(), source: "scene.toml".to_owned(), text: text.to_owned(), expect: Expect::All }
     }
     fn plan(file: &str) -> Plan {
         let text = format!("base = \"scene.toml\"\nfigures = [\"cycles\", \"slave.3.lock_time\"]\n{file}");
