@@ -67,6 +67,9 @@ far or a GSD file is inconsistent, 2 wrong usage, scenario or file.";
 const GSD_CODES: &str = "\
 Exit codes: 0 the file fits together (notes are no fault), 1 it is inconsistent: one of the findings is an error, 2 it cannot be read.";
 
+const SWEEP_CODES: &str = "\
+Exit codes: 0 all runs are done, 1 some failed or are missing, 2 wrong usage or file, 130 stopped by Ctrl-C; the same call goes on.";
+
 const REGRESSION: &str = "\
 Examples:
   isodp baseline scenarios/reference.toml --tolerance '*.p99=2%' --tolerance 'slave.each.lock_time=5 ms'
@@ -79,9 +82,6 @@ Examples:
       Two scenarios.
 
 Exit codes of compare: 0 nothing moved beyond its tolerance, 1 a figure did, 2 wrong usage, file, or baseline.";
-
-const SWEEP_CODES: &str = "\
-Exit codes: 0 all runs are done, 1 some failed or are missing, 2 wrong usage or file, 130 stopped by Ctrl-C; the same call goes on.";
 
 /// Simulates isochronous PROFIBUS DP (DP-V2) networks, telegram by telegram, in deterministic time.
 #[derive(Parser)]
@@ -105,18 +105,18 @@ enum Command {
     /// Runs a scenario again and tells a stretch of it, every telegram and every observation, line by line.
     #[command(after_help = EXAMPLES)]
     Replay(ReplayArgs),
-    /// Keeps what a scenario comes to, every figure and where to look for a difference, in a file to compare with later.
-    #[command(after_help = REGRESSION)]
-    Baseline(BaselineArgs),
-    /// Runs a scenario and tells which figures moved since its baseline was written, and where the two runs parted.
-    #[command(after_help = REGRESSION)]
-    Compare(CompareArgs),
     /// Runs a scenario many times, with other parameters and other draws, on all cores; what is done is not done again.
     #[command(after_help = SWEEP_CODES)]
     Sweep(SweepArgs),
     /// Joins the parts of a sweep that several machines ran with isodp sweep --shard.
     #[command(after_help = SWEEP_CODES)]
     Merge(MergeArgs),
+    /// Keeps what a scenario comes to, every figure and where to look for a difference, in a file to compare with later.
+    #[command(after_help = REGRESSION)]
+    Baseline(BaselineArgs),
+    /// Runs a scenario and tells which figures moved since its baseline was written, and where the two runs parted.
+    #[command(after_help = REGRESSION)]
+    Compare(CompareArgs),
     /// Lists the devices that a scenario can name, or tells everything about one; others come from GSD files, see isodp gsd.
     Devices(DevicesArgs),
     /// Lists the disturbances that a scenario can name, with their keys and an example of each, or tells about one.
@@ -330,10 +330,10 @@ fn main() -> ExitCode {
         Command::Plan(args) => plan_command(args),
         Command::Budget(args) => budget_command(args).map(done),
         Command::Replay(args) => replay_command(args).map(done),
-        Command::Baseline(args) => baseline_command(args).map(done),
-        Command::Compare(args) => compare_command(args),
         Command::Sweep(args) => sweep_command(args),
         Command::Merge(args) => merge_command(&args),
+        Command::Baseline(args) => baseline_command(args).map(done),
+        Command::Compare(args) => compare_command(args),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
         Command::Disturbances(args) => disturbances_command(args.name.as_deref()).map(done),
         Command::Figures(args) => figures_command(args.scenario.as_deref()).map(done),
@@ -444,18 +444,6 @@ fn replay_command(args: ReplayArgs) -> Result<String, Box<dyn std::error::Error>
     Ok(format!("{page}\n{} files in {}\n", files.len(), dir.display()))
 }
 
-fn baseline_command(args: BaselineArgs) -> Result<String, Box<dyn std::error::Error>> {
-    let BaselineArgs { scenario: file, out, tolerances, seed, sets } = args;
-    baseline::answer(&baseline::Call { file, sets: with_seed(sets, seed), out, tolerances })
-}
-
-fn compare_command(args: CompareArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
-    let CompareArgs { scenario: file, with, tolerances, all, seed, sets } = args;
-    let answer = compare::answer(&compare::Call { file, with, sets: with_seed(sets, seed), tolerances, all })?;
-    let code = if answer.beyond { ExitCode::from(VIOLATED) } else { ExitCode::SUCCESS };
-    Ok((answer.page, code))
-}
-
 fn sweep_command(args: SweepArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
     let SweepArgs { file, out, threads, shard, plan } = args;
     let stop = Arc::new(AtomicBool::new(false));
@@ -486,6 +474,18 @@ fn code(end: End) -> ExitCode {
         End::Failed => ExitCode::from(VIOLATED),
         End::Stopped => ExitCode::from(STOPPED),
     }
+}
+
+fn baseline_command(args: BaselineArgs) -> Result<String, Box<dyn std::error::Error>> {
+    let BaselineArgs { scenario: file, out, tolerances, seed, sets } = args;
+    baseline::answer(&baseline::Call { file, sets: with_seed(sets, seed), out, tolerances })
+}
+
+fn compare_command(args: CompareArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
+    let CompareArgs { scenario: file, with, tolerances, all, seed, sets } = args;
+    let answer = compare::answer(&compare::Call { file, with, sets: with_seed(sets, seed), tolerances, all })?;
+    let code = if answer.beyond { ExitCode::from(VIOLATED) } else { ExitCode::SUCCESS };
+    Ok((answer.page, code))
 }
 
 /// Overrides with that of the seed, where one is given.

@@ -367,7 +367,7 @@ pub enum Observation {
         /// How late its sending begins.
         by: Span,
     },
-    /// The token came back so late that whole cycles are left out.
+    /// The token came back, or acyclic traffic of the master itself ended, so late that whole cycles are left out.
     SynchMissed {
         /// How many SYNCH never left.
         cycles: u64,
@@ -849,7 +849,7 @@ impl fmt::Display for Observation {
             Self::ExchangeDone { t_dx, retries } => write!(f, "T_DX {t_dx}, {retries} retries"),
             Self::CycleSpare { acyclic, spare } => write!(f, "acyclic part and token {acyclic}, spare {spare}"),
             Self::ClockLate { by } => write!(f, "SYNCH {by} late, the bus was in use"),
-            Self::SynchMissed { cycles } => write!(f, "{cycles} SYNCH missed, the token was away"),
+            Self::SynchMissed { cycles } => write!(f, "{cycles} SYNCH missed, the token was away or the bus in use"),
             Self::MasterMode { from, to } => write!(f, "master {from} -> {to}"),
             Self::Handler { slave, from, to } => write!(f, "slave {slave}: {from} -> {to}"),
             Self::Retry { slave } => write!(f, "slave {slave}: request repeated"),

@@ -97,6 +97,7 @@ fn disturbances_of_the_line_allocate_nothing() {
         "kind = \"noise\"\ncycle = 0\nfor = 1\nevery = 30\nafter = \"30 us\"",
         "kind = \"foreign-telegram\"\nat = \"1 ms\"\nfor = \"1 ms\"\nevery = \"41 ms\"\ndata = { to = 4, from = 9, fc = 0x49 }",
         "kind = \"late-token\"\nstation = 12\nby = \"20 us\"\ncycle = 1\nfor = 10\nevery = 25",
+        "kind = \"overlong-acyclic\"\nto = 4\noctets = 100\ncycle = 500\nfor = 2\nevery = 25",
     ] {
         text += "\n[[disturbance]]\n";
         text += keys;

@@ -1,6 +1,7 @@
 //! Disturbances of stations, clocks and paths: each is seen at full strength and not at all at none, leaves the draws of
 //! others alone, and two at once do what each does.
 
+mod acyclic;
 mod clock;
 mod gc_jitter;
 mod path;

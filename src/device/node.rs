@@ -6,7 +6,7 @@ use crate::device::encoder::Encoder;
 use crate::device::tool::Tool;
 use crate::dp::class2::Class2;
 use crate::dp::handler::{Patch, StartupTelegram};
-use crate::dp::master::{Master, Order};
+use crate::dp::master::{Master, Order, Overlong};
 use crate::fdl::active::HoldToken;
 use crate::fdl::{Filter, Input, Outbox, Station};
 use crate::observation::MasterMode;
@@ -24,6 +24,8 @@ pub enum Command {
     Control(GlobalControl),
     /// Tokens are kept longer, to any master.
     HoldToken(HoldToken),
+    /// DS-Write in every cycle, whether it fits or not, or no more, to a class 1 master.
+    Overlong(Option<Overlong>),
     /// Something for the master's application.
     Application(ControllerCommand),
 }
@@ -73,6 +75,7 @@ impl Station for Node {
                     Command::Patch(slave, telegram, patch) => Some(Order::Patch(slave, telegram, patch)),
                     Command::Control(control) => Some(Order::Control(control)),
                     Command::HoldToken(order) => Some(Order::HoldToken(order)),
+                    Command::Overlong(order) => Some(Order::Overlong(order)),
                     Command::Application(command) => Some(Order::Application(command)),
                 });
                 if let Some(input) = input {

@@ -33,14 +33,18 @@
 //! [`handler`](crate::dp::handler). When the mode changes without an order says
 //! [`supervision`](crate::dp::supervision).
 //!
-//! A part that has nothing to do, or whose longest course would not end before the next SYNCH, is left out.
+//! A part that has nothing to do, or whose longest course would not end before the next SYNCH, is left out. The scenario may
+//! order acyclic messages that keep no such rule, see `master/overlong.rs`.
 
 mod cycle;
+mod overlong;
 
 use alloc::vec::Vec;
 
 pub use cycle::Pace;
 use cycle::Polling;
+use overlong::Overload;
+pub use overlong::Overlong;
 
 use crate::dp::handler::{Answer, Handler, Patch, SAP_FRAME_OCTETS, SlaveParams, StartupTelegram};
 use crate::dp::iso::{CycleClock, Rearm};
@@ -93,6 +97,8 @@ pub enum Order<C> {
     Control(GlobalControl),
     /// Tokens are kept longer.
     HoldToken(HoldToken),
+    /// DS-Write in every cycle, whether it fits or not, or no more. The supply ends it too.
+    Overlong(Option<Overlong>),
     /// Something for its application.
     Application(C),
 }
@@ -179,6 +185,7 @@ pub struct Master<A> {
     /// Where the search for the next slave in start-up begins.
     startup_next: usize,
     ms1: Client,
+    overload: Overload,
     /// Number of the first cycle since power on.
     begun: u64,
     polling: Polling,
@@ -210,6 +217,7 @@ impl<A: Application> Master<A> {
             supervision: Supervision::new(settings.auto_clear, settings.data_control_time, settings.clear_for),
             startup_next: 0,
             ms1: Client::new(),
+            overload: Overload::default(),
             begun: 0,
             polling: Polling::new(),
             bereft: false,
@@ -247,6 +255,7 @@ impl<A: Application> Master<A> {
             self.give_up_job(slave, out);
         }
         self.commands.clear();
+        self.overload.end();
         self.supervision.restart();
         (self.control_due, self.control_told, self.startup_next) = (true, 0, 0);
         self.active = Active::new(self.settings.address, self.settings.bus);
@@ -266,11 +275,11 @@ impl<A: Application> Master<A> {
             }
             (Part::Startup(slave), confirm) => {
                 self.startup_answered(slave, confirm, out);
-                self.gap(out);
+                self.after_message(now, out);
             }
             (Part::Acyclic, confirm) => {
                 self.acyclic_answered(now, confirm, out);
-                self.gap(out);
+                self.after_message(now, out);
             }
             (Part::Gap(address), Confirm::Gap(answer)) => {
                 out.observe(Observation::Gap { address, answer });
@@ -297,8 +306,10 @@ impl<A: Application> Master<A> {
     }
 
     fn synch(&mut self, now: Local, out: &mut Outbox) {
+        let free = self.active.free_at().max(now);
+        self.miss(free, out);
         let planned = self.clock.planned();
-        let at = planned.max(self.active.free_at()).max(now);
+        let at = planned.max(free);
         if at > planned {
             out.observe(Observation::ClockLate { by: at - planned });
         }
@@ -320,6 +331,7 @@ impl<A: Application> Master<A> {
         self.exchange_end = now;
         self.exchanged = false;
         self.retries = 0;
+        self.overload.cycle_begins();
         out.observe(Observation::CycleStart { cycle, nominal });
         let (mode, to_blame) = self.supervision.cycle(now, cycle - self.begun, self.mode, &self.handlers);
         if let Some(slave) = to_blame {
@@ -417,23 +429,22 @@ impl<A: Application> Master<A> {
         if let Some(slave) = self.ms1.overdue(now) {
             self.acyclic_done((now - since, slave), Err(Failure::Timeout), out);
         }
-        if self.ms1.is_idle()
-            && let Some(job) = self.app.acyclic()
-        {
-            self.ms1.begin(now, job, self.handlers[job.slave].params().ms1_timeout);
+        if self.ms1.is_idle() {
+            self.next_job(now);
         }
         match starting {
-            Some(slave) if self.ms1.is_idle() || self.clock.coming().is_multiple_of(2) => self.startup(slave, out),
+            Some(slave) if self.ms1.is_idle() || self.clock.coming().is_multiple_of(2) => self.startup(now, slave, out),
             _ if !self.ms1.is_idle() => self.acyclic_message(out),
             _ => self.gap(out),
         }
     }
     fn acyclic_message(&mut self, out: &mut Outbox) {
-        let Some((slave, du)) = self.ms1.next().filter(|_| self.may_low()) else { return self.gap(out) };
+        let heedless = self.overload.is_ordered();
+        let Some((slave, du)) = self.ms1.next().filter(|_| heedless || self.may_low()) else { return self.gap(out) };
         let longest = SAP_FRAME_OCTETS + self.ms1.longest_answer();
-        let Some(retries) = self.retries_that_fit(SAP_FRAME_OCTETS + du.len(), longest) else {
-            return self.gap(out);
-        };
+        let fitting = self.retries_that_fit(SAP_FRAME_OCTETS + du.len(), longest);
+        let Some(retries) = fitting.or(heedless.then_some(0)) else { return self.gap(out) };
+        self.overload.sends(du);
         let to = self.handlers[slave].params().address;
         let request = Request { to, service: Service::SrdLow, saps: Some(MS1), retries };
         self.active.request(self.active.free_at(), &request, du.len(), out, |to| to.copy_from_slice(du));
@@ -457,7 +468,9 @@ impl<A: Application> Master<A> {
     fn acyclic_done(&mut self, (took, slave): (Span, usize), answer: Result<&[u8], Failure>, out: &mut Outbox) {
         let (address, class) = (self.handlers[slave].params().address, MasterClass::One);
         out.observe(Observation::AcyclicDone { slave: address, class, result: ms1::result(answer), took });
-        self.app.acyclic_done(slave, answer, out);
+        if !self.overload.over() {
+            self.app.acyclic_done(slave, answer, out);
+        }
     }
     /// How often a request of `octets` characters with an answer of up to `reply` may be repeated before the next
     /// SYNCH; none if it does not fit once.
@@ -486,11 +499,11 @@ impl<A: Application> Master<A> {
         out.arm(Timer::Schedule, end);
         octets
     }
-    fn startup(&mut self, slave: usize, out: &mut Outbox) {
+    fn startup(&mut self, now: Local, slave: usize, out: &mut Outbox) {
         let handler = &self.handlers[slave];
         let (saps, du, reply) = handler.service();
         let Some(retries) = self.retries_that_fit(SAP_FRAME_OCTETS + du.len(), SAP_FRAME_OCTETS + reply) else {
-            return self.gap(out);
+            return self.after_message(now, out);
         };
         let request = Request { to: handler.params().address, service: Service::SrdHigh, saps: Some(saps), retries };
         self.active.request(self.active.free_at(), &request, du.len(), out, |to| to.copy_from_slice(du));
@@ -575,6 +588,7 @@ impl<A: Application> Station for Master<A> {
             | Input::Command(Order::Mode(_) | Order::Control(_)) => {}
             Input::Command(Order::Patch(slave, telegram, patch)) => self.patch(slave, telegram, &patch, out),
             Input::Command(Order::HoldToken(order)) => self.active.hold_token(order),
+            Input::Command(Order::Overlong(order)) => self.overload(order),
             Input::Command(Order::Application(command)) => self.app.command(command, out),
         }
     }

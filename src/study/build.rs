@@ -241,6 +241,10 @@ fn order_bursts(scenario: &Scenario, slaves: &[Address], fault: OrderFault) -> [
             let hold = |by| slaves.iter().map(|&master| (master, Command::HoldToken(HoldToken(by)))).collect();
             [hold(by), hold(Span::ZERO)]
         }
+        OrderFault::Overlong(overlong) => {
+            let order = |order| slaves.iter().map(|&master| (master, Command::Overlong(order))).collect();
+            [order(Some(overlong)), order(None)]
+        }
         OrderFault::WrongPrm(patch) => {
             let prm = |patch| move |slave| Command::Patch(slave, StartupTelegram::Prm, patch);
             [all(&prm(patch)), all(&prm(Patch::default()))]

@@ -86,7 +86,7 @@ fn ring(summary: &Summary, lines: &mut Vec<String>) {
     let Some(ring) = &summary.ring else { return };
     let missed = match ring.missed_clocks {
         0 => "none missed".to_owned(),
-        missed => format!("{missed} missed, the token was away for whole cycles"),
+        missed => format!("{missed} missed, the token was away or the bus in use for whole cycles"),
     };
     let delay = summary.distribution("synch_delay").filter(|delay| delay.count > 0);
     lines.push(match delay {

@@ -121,12 +121,16 @@ impl<A: Application> Master<A> {
 
     // ----- isochronous
 
-    /// The token is back: whole cycles may have gone by.
-    fn back(&mut self, now: Local, out: &mut Outbox) {
-        let cycles = self.clock.miss(self.active.free_at().max(now));
+    /// Leaves out the cycles whose SYNCH is a whole T_DP and more late at `now`.
+    pub(super) fn miss(&mut self, now: Local, out: &mut Outbox) {
+        let cycles = self.clock.miss(now);
         if cycles > 0 {
             out.observe(Observation::SynchMissed { cycles });
         }
+    }
+    /// The token is back: whole cycles may have gone by.
+    fn back(&mut self, now: Local, out: &mut Outbox) {
+        self.miss(self.active.free_at().max(now), out);
         let t_tr = self.settings.bus.span(self.settings.bus.t_tr);
         if self.settings.active_spare && self.fits(t_tr) {
             return self.pass_on(out);

@@ -1,6 +1,7 @@
 //! What goes wrong in masters and their applications: orders at the beginning and at the end of each burst.
 
 use crate::dp::handler::Patch;
+use crate::dp::master::Overlong;
 use crate::time::Span;
 
 /// What a disturbance orders of masters, or of the masters of slaves.
@@ -14,6 +15,8 @@ pub enum OrderFault {
     RepeatLife,
     /// These masters keep each token so much longer.
     HoldToken(Span),
+    /// These masters write a record in every cycle, whether it fits or not.
+    Overlong(Overlong),
     /// These slaves are started anew with a changed Set_Prm, and with the good one at the end.
     WrongPrm(Patch),
 }
@@ -25,6 +28,7 @@ impl OrderFault {
             (self, other),
             (Self::HoldLife, Self::HoldLife)
                 | (Self::HoldToken(_), Self::HoldToken(_))
+                | (Self::Overlong(_), Self::Overlong(_))
                 | (Self::WrongPrm(_), Self::WrongPrm(_))
         )
     }

@@ -1,6 +1,6 @@
 //! Compare: what moved from one run to another, and where the two parted.
 //!
-//! The run before is a [`Baseline`], or a second scenario that is run too. Figures are laid side by side with their
+//! The run before is a [`Baseline`](super::baseline::Baseline), or a second scenario that is run too. Figures are laid side by side with their
 //! tolerances. If the fingerprints differ, the first difference is looked for in the way that tells most:
 //!
 //! | the run before | how the first difference is found | both values |

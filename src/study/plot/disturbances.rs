@@ -11,7 +11,7 @@ use super::look::{
     fit, legend, legend_height, page,
 };
 use super::timeline::{MARKS, PHASES};
-use crate::observation::{ClockVerdict, Observation, Phase, SlaveState};
+use crate::observation::{ClockVerdict, Disturbance, Observation, Phase, SlaveState};
 use crate::study::row::{EventRow, SlaveRow};
 
 /// Slaves that are shown.
@@ -125,13 +125,16 @@ pub(super) struct Disturbed {
     /// Last cycle of the run.
     end: u64,
     bus: Buckets<Troubles>,
+    /// Disturbances whose burst goes on, by their bits.
+    going_on: u64,
     slaves: Vec<Lane>,
 }
 
 impl Disturbed {
     pub(super) fn new(slaves: usize) -> Self {
         let lane = Lane { pieces: Buckets::new(PIECES), recent: [Cell::default(); BEFORE as usize], score: (0, 0, 0) };
-        Self { start: None, last: 0, end: 0, bus: Buckets::new(PIECES), slaves: vec![lane; slaves] }
+        let slaves = vec![lane; slaves];
+        Self { start: None, last: 0, end: 0, bus: Buckets::new(PIECES), going_on: 0, slaves }
     }
     /// Whether anything happened.
     pub(super) const fn any(&self) -> bool {
@@ -141,6 +144,9 @@ impl Disturbed {
     /// Takes in one cycle of slave number `index`.
     pub(super) fn slave(&mut self, index: usize, row: &SlaveRow) {
         self.end = row.cycle;
+        if let Some(start) = self.start.filter(|_| self.going_on != 0 && index == 0) {
+            self.bus.at(row.cycle.saturating_sub(start)).0 |= self.going_on;
+        }
         let lane = &mut self.slaves[index];
         let cell = Cell::of(row);
         lane.recent[(row.cycle % BEFORE) as usize] = cell;
@@ -169,6 +175,11 @@ impl Disturbed {
         let piece = row.cycle.saturating_sub(start);
         if let Some(bit) = trouble {
             self.bus.at(piece).0 |= 1 << bit;
+            match row.what {
+                Observation::Disturbed { how: Disturbance::Begins, .. } => self.going_on |= 1 << bit,
+                Observation::Disturbed { how: Disturbance::Ends, .. } => self.going_on &= !(1 << bit),
+                _ => {}
+            }
         }
         let Some(lane) = slave.map(|index| &mut self.slaves[index]) else { return };
         if let Some(mark) = mark {
@@ -286,11 +297,12 @@ fn words(material: &Material<'_>, start: u64, cycles: u64, shown: usize) -> Word
     } else {
         String::new()
     };
+    let quiet = if cycles > QUIET { " Without an error: quiet for long, not kept." } else { "" };
     Words {
         title: "Disturbances: what hit the network, and what it did to the slaves",
         subtitle: format!(
             "{whose}, cycles {start} to {}, from the first trouble to the last change.{each} Above and below ±{LINEAR} ns \
-             the error is drawn logarithmically.",
+             the error is drawn logarithmically.{quiet}",
             start + cycles.saturating_sub(1),
         ),
         plotted: "disturbances, PLL error with its window, DP state, phase and faults",

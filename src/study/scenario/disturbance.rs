@@ -1,6 +1,7 @@
 //! Disturbances: the tables `[[disturbance]]`, each with a kind, a name and a window. A new kind is a line of the
 //! registry and a row beside the kinds of its family.
 
+mod acyclic;
 pub(super) mod application;
 pub(super) mod clock;
 mod gc_jitter;
@@ -58,6 +59,7 @@ pub const DISTURBANCES: &[DisturbanceKind] = &[
     source::NOISE,
     source::FOREIGN_TELEGRAM,
     token::LATE_TOKEN,
+    acyclic::OVERLONG_ACYCLIC,
     station::SILENT,
     station::MUTE,
     station::DEAF,

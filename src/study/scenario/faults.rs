@@ -1077,6 +1077,12 @@ good.toml:45:9: disturbance.1.every: this is a number, but the disturbance begin
   help: a time with its unit, such as "20 ms"
 "#,
         ),
+    ]);
+}
+
+#[test]
+fn repetitions_and_names_that_cannot_be() {
+    check(&[
         (
             "cycle = 1000\nfor = 1\nevery = 100",
             "at = \"1 s\"\nfor = \"2 ms\"\nevery = \"1 ms\"",

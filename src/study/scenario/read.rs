@@ -93,7 +93,9 @@ pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scena
         list(reader, &root, "class2", |section, reader| class2::read(section, reader, &addresses, topology.as_ref()));
     let links = list(reader, &root, "link", link);
     let events = list(reader, &root, "event", |section, reader| event(section, reader, &addresses));
-    reader.around = Around { slaves: addresses, topology: topology.clone(), rate };
+    let heard = slaves.iter().filter(|slave| !slave.silent);
+    let masters = heard.map(|slave| (slave.address, slave.master)).collect();
+    reader.around = Around { slaves: addresses, masters, topology: topology.clone(), rate };
     let disturbances = disturbances(reader, &root);
     let record = record(Section::of_file(reader, &root, "record"), reader);
     let expectations = expect::read(reader, &root, rate);

@@ -29,6 +29,8 @@ pub(in crate::study) struct Reader<'a> {
 pub(super) struct Around {
     /// Addresses of all slaves, in order.
     pub(super) slaves: Vec<Address>,
+    /// The slaves that a master has in its list, each with that master, in order.
+    pub(super) masters: Vec<(Address, Address)>,
     pub(super) topology: Option<Topology>,
     pub(super) rate: BitRate,
 }
@@ -41,7 +43,7 @@ impl<'a> Reader<'a> {
             places: BTreeMap::new(),
             gsd_files: BTreeMap::new(),
             proposes: false,
-            around: Around { slaves: Vec::new(), topology: None, rate: BitRate::M12 },
+            around: Around { slaves: Vec::new(), masters: Vec::new(), topology: None, rate: BitRate::M12 },
             problems: Vec::new(),
         }
     }

@@ -7,6 +7,7 @@
 //! figures = ["latch_skew.p99", "faults"]
 //! confidence = "95 %"                  # of the intervals in summary.csv
 //! until = { figure = "latch_skew.p99", relative_half_width = "2 %", max_repetitions = 200 }
+//! expect = "all"                       # or "own": of the scenario's expectations only those that this file sets count
 //! invalid = "fail"                     # or "skip": leave out combinations that break a rule
 //!
 //! [set]                                # changed in every run
@@ -68,6 +69,8 @@ pub struct Definition {
     pub confidence: Confidence,
     /// When a combination has enough runs; without it [`Self::repetitions`] are enough.
     pub until: Option<Until>,
+    /// Which expectations count.
+    pub expect: Expect,
     /// What becomes of combinations that break a rule.
     pub invalid: Invalid,
     /// Where each figure is written.
@@ -92,6 +95,15 @@ pub struct Until {
     pub rule: StopRule,
     /// Most runs.
     pub most: u32,
+}
+
+/// Which of the scenario's expectations count in a sweep.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Expect {
+    /// All of them.
+    All,
+    /// Those that the sweep file sets itself, `"expect.clock_failures" = "== 0"`.
+    Own,
 }
 
 /// What becomes of combinations that break a rule of the bus or of a device.
@@ -174,20 +186,11 @@ fn read(reader: &mut Reader<'_>, mut section: Section<'_>) -> Option<Definition>
     let skips = if all_read { skips } else { Vec::new() };
     let skips = skips.iter().filter_map(|section| Skip::read(section, reader, &axes)).collect();
     let repetitions = s.optional(reader, "repetitions", number(1..=MOST_REPETITIONS)).unwrap_or(1);
-    let draws = s.optional(reader, "draws", |node| match text(node)? {
-        "independent" => Ok(Draws::Independent),
-        "common" => Ok(Draws::Common),
-        _ => Err(Fault::new("there are no such draws").help("\"independent\" or \"common\"")),
-    });
+    let draws = s.optional(reader, "draws", one_of(["independent", "common"], [Draws::Independent, Draws::Common]));
     let figures = figures(s, reader);
     let confidence = s.optional(reader, "confidence", confidence).unwrap_or(Confidence::USUAL);
-    let invalid =
-        s.optional(reader, "invalid", |node| match text(node)? {
-            "fail" => Ok(Invalid::Fail),
-            "skip" => Ok(Invalid::Skip),
-            _ => Err(Fault::new("a combination that breaks a rule can be done nothing else with")
-                .help("\"fail\" or \"skip\"")),
-        });
+    let expected = s.optional(reader, "expect", one_of(["all", "own"], [Expect::All, Expect::Own]));
+    let invalid = s.optional(reader, "invalid", one_of(["fail", "skip"], [Invalid::Fail, Invalid::Skip]));
     let until = until(s, reader, figures.as_deref().unwrap_or_default(), confidence, repetitions);
     let runs = Combinations::new(&axes).len().saturating_mul(repetitions.into());
     if runs > MOST_RUNS {
@@ -209,9 +212,20 @@ fn read(reader: &mut Reader<'_>, mut section: Section<'_>) -> Option<Definition>
         figures,
         confidence,
         until,
+        expect: expected.unwrap_or(Expect::All),
         invalid: invalid.unwrap_or(Invalid::Fail),
         places,
     })
+}
+
+/// One of two words and what it means.
+fn one_of<T: Copy>(words: [&'static str; 2], meanings: [T; 2]) -> impl Fn(&Node) -> Result<T, Fault> {
+    move |node| {
+        let word = text(node)?;
+        let found = words.into_iter().zip(meanings).find(|&(known, _)| known == word);
+        let fault = || Fault::new(format!("\"{word}\" is not known here"));
+        found.map(|(_, meaning)| meaning).ok_or_else(|| fault().help(format!("\"{}\" or \"{}\"", words[0], words[1])))
+    }
 }
 
 /// `until = { ... }`, if it is there.

@@ -263,7 +263,9 @@ mod tests {
     }
     fn filled(path: &Path, numbers: &[u128]) {
         let mut journal = Journal::open(path, &names()).unwrap();
-        numbers.iter().for_each(|&number| journal.append(&record(number)).unwrap());
+        for &number in numbers {
+            journal.append(&record(number)).unwrap();
+        }
     }
 
     #[test]

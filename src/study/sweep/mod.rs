@@ -6,7 +6,7 @@
 //!               figures       refused, run            the other each       per run
 //! ```
 //!
-//! A run is told by its [key](key::RunKey) alone: what is in the [journal](journal) is never computed twice, whatever
+//! A run is told by its [key](key::RunKey) alone: what is in the [journal] is never computed twice, whatever
 //! ended the sweep before and however its file has grown since. Tables are written from the journal in the order of the
 //! plan, so that they do not tell how many threads, calls or machines there were.
 

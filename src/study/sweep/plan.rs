@@ -12,7 +12,7 @@ use std::sync::atomic::AtomicBool;
 use serde::{Deserialize, Serialize};
 
 use super::crew;
-use super::definition::{Definition, Draws, Invalid, Until};
+use super::definition::{Definition, Draws, Expect, Invalid, Until};
 use super::journal::{Journal, JournalError};
 use super::key::{Identity, RunKey};
 use super::shard::Shard;
@@ -32,6 +32,8 @@ pub struct Base {
     pub source: String,
     /// Its text.
     pub text: String,
+    /// Which of its expectations count.
+    pub expect: Expect,
 }
 
 impl Base {
@@ -41,14 +43,19 @@ impl Base {
     /// It cannot be read.
     pub fn load(definition: &Definition) -> Result<Self, ScenarioError> {
         let (name, source, text) = Scenario::text_of(&definition.base_path())?;
-        Ok(Self { name, source, text })
+        Ok(Self { name, source, text, expect: definition.expect })
     }
     /// The scenario with these changes.
     ///
     /// # Errors
     /// As [`Scenario::parse`].
     pub fn with(&self, sets: &[(String, String)]) -> Result<Scenario, ScenarioError> {
-        Scenario::parse(&self.name, &self.source, &self.text, sets)
+        let mut scenario = Scenario::parse(&self.name, &self.source, &self.text, sets)?;
+        if self.expect == Expect::Own {
+            let own = |name: &str| sets.iter().any(|(key, _)| key.strip_prefix("expect.") == Some(name));
+            scenario.expectations.retain(|expectation| own(expectation.figure.name()));
+        }
+        Ok(scenario)
     }
 }
 

@@ -97,6 +97,7 @@ fn words(panic: &(dyn Any + Send)) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::sweep::definition::Expect;
     use crate::study::sweep::journal::Journal;
     use crate::study::sweep::plan::Fate;
 
@@ -104,7 +105,7 @@ mod tests {
         t_i = \"125 us\"\nt_o = \"500 us\"\n[[slave]]\naddress = 3\ndevice = \"posital-ocd-dpb1b\"\n";
 
     fn base(text: &str) -> Base {
-        Base { name: "scene".to_owned(), source: "scene.toml".to_owned(), text: text.to_owned() }
+        Base { name: "scene".to_owned(), source: "scene.toml".to_owned(), text: text.to_owned(), expect: Expect::All }
     }
     fn plan(file: &str) -> Plan {
         let text = format!("base = \"scene.toml\"\nfigures = [\"cycles\", \"slave.3.lock_time\"]\n{file}");
@@ -172,7 +173,9 @@ mod tests {
             if jobs.is_empty() {
                 break;
             }
-            jobs.iter().for_each(|job| append(&mut journal, job, if job.repetition % 2 == 0 { 90 } else { 110 }));
+            for job in &jobs {
+                append(&mut journal, job, if job.repetition % 2 == 0 { 90 } else { 110 });
+            }
         }
         assert_eq!(counts, [12, 15, 18, 22, 27, 33, 40, 40], "given up at the most");
         narrow.jobs().for_each(|job| append(&mut journal, &job, 100));

@@ -72,7 +72,7 @@ fn order(fault: OrderFault, section: &mut Section<'_>, reader: &mut Reader<'_>) 
 pub(in crate::study::scenario) fn are_slaves(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     for (i, disturbance) in facts.scenario.disturbances.iter().enumerate() {
         let What::Order(stations, fault) = &disturbance.what else { continue };
-        if matches!(fault, OrderFault::HoldToken(_)) {
+        if matches!(fault, OrderFault::HoldToken(_) | OrderFault::Overlong(_)) {
             continue;
         }
         let no_slave = |address: &&_| facts.scenario.slave(**address).is_none_or(|slave| slave.silent);
