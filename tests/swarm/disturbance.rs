@@ -92,6 +92,11 @@ pub(super) const KINDS: &[(&str, Generator)] = &[
         let master = draw.one(&scene.network.masters());
         Some(Drawn::new(format!("station = {master}\nby = \"{} us\"\n", draw.within(0..=500)), true))
     }),
+    ("overlong-acyclic", |draw, scene| {
+        let to = slave(draw, scene, "").keys.replace("station", "to");
+        // It may be the master of a slave that hears the next SYNCH late.
+        Some(Drawn::new(format!("{to}octets = {}\n", draw.within(1..=240)), true))
+    }),
     ("silent", |draw, scene| Some(station(draw, scene))),
     ("mute", |draw, scene| Some(station(draw, scene))),
     ("deaf", |draw, scene| Some(station(draw, scene))),
