@@ -234,6 +234,24 @@ struct ReplayArgs {
     run_sets: Vec<(String, String)>,
 }
 
+/// What is otherwise than in the scenario's file.
+#[derive(Args)]
+struct Changes {
+    /// Seed of all random streams, instead of the scenario's.
+    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
+    seed: Option<u64>,
+    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    sets: Vec<(String, String)>,
+}
+
+impl Changes {
+    /// The overrides, that of the seed among them.
+    fn sets(self) -> Vec<(String, String)> {
+        with_seed(self.sets, self.seed)
+    }
+}
+
 #[derive(Args)]
 struct BaselineArgs {
     /// Scenario file (TOML).
@@ -245,12 +263,8 @@ struct BaselineArgs {
     /// By how much figures may move later: NAME=5%, NAME=100ns, NAME=3; in NAME, * stands for anything. Several times.
     #[arg(long = "tolerance", value_name = "NAME=LIMIT", value_parser = assignment)]
     tolerances: Vec<(String, String)>,
-    /// Seed of all random streams, instead of the scenario's.
-    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
-    seed: Option<u64>,
-    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
-    sets: Vec<(String, String)>,
+    #[command(flatten)]
+    changes: Changes,
 }
 
 #[derive(Args)]
@@ -280,15 +294,11 @@ struct BudgetArgs {
     /// Scenario file (TOML).
     #[arg(value_name = "FILE")]
     scenario: PathBuf,
-    /// Seed of all random streams, instead of the scenario's.
-    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
-    seed: Option<u64>,
     /// Directory for the results; they go to DIR/<scenario>/.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
-    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
-    sets: Vec<(String, String)>,
+    #[command(flatten)]
+    changes: Changes,
 }
 
 #[derive(Args)]
@@ -296,15 +306,11 @@ struct RunArgs {
     /// Scenario files (TOML).
     #[arg(value_name = "FILE", required = true)]
     scenarios: Vec<PathBuf>,
-    /// Seed of all random streams, instead of the scenario's.
-    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
-    seed: Option<u64>,
     /// Directory for the results; they go to DIR/<scenario>/.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
-    /// Changes a value of the scenario, for example master.t_o='1.5 ms'. May be given several times.
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
-    sets: Vec<(String, String)>,
+    #[command(flatten)]
+    changes: Changes,
     /// File for the verdicts on the expectations as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
@@ -366,8 +372,8 @@ fn show(page: &str) -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn run_command(args: RunArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
-    let RunArgs { scenarios: files, seed, out, sets, junit, verdicts } = args;
-    let call = batch::Call { files, sets: with_seed(sets, seed), out, junit, verdicts };
+    let RunArgs { scenarios: files, changes, out, junit, verdicts } = args;
+    let call = batch::Call { files, sets: changes.sets(), out, junit, verdicts };
     let scenarios = batch::load(&call)?;
     for warning in batch::warnings_of(&scenarios) {
         // Where standard error is gone, the summary tells.
@@ -394,7 +400,7 @@ fn plan_command(args: PlanArgs) -> Result<(String, ExitCode), Box<dyn std::error
 }
 
 fn budget_command(args: BudgetArgs) -> Result<String, Box<dyn std::error::Error>> {
-    let scenario = Scenario::load(&args.scenario, &with_seed(args.sets, args.seed))?;
+    let scenario = Scenario::load(&args.scenario, &args.changes.sets())?;
     for warning in batch::warnings_of(std::slice::from_ref(&scenario)) {
         let _ = writeln!(anstream::stderr(), "warning: {warning}");
     }
@@ -477,8 +483,8 @@ fn code(end: End) -> ExitCode {
 }
 
 fn baseline_command(args: BaselineArgs) -> Result<String, Box<dyn std::error::Error>> {
-    let BaselineArgs { scenario: file, out, tolerances, seed, sets } = args;
-    baseline::answer(&baseline::Call { file, sets: with_seed(sets, seed), out, tolerances })
+    let BaselineArgs { scenario: file, out, tolerances, changes } = args;
+    baseline::answer(&baseline::Call { file, sets: changes.sets(), out, tolerances })
 }
 
 fn compare_command(args: CompareArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::export::decimal::Decimal;
+use super::export::decimal::us_or_null;
 use crate::observation::{AcyclicResult, MasterClass, Observation};
 use crate::time::Span;
 
@@ -133,11 +133,6 @@ impl AcyclicSummary {
             "acyclic, {class}: {requests} requests, {positive} answered{others}; response {min} to {max}, mean {mean}"
         )
     }
-}
-
-#[allow(clippy::ref_option)]
-fn us_or_null<S: serde::Serializer>(span: &Option<Span>, serializer: S) -> Result<S::Ok, S::Error> {
-    span.map(Decimal::us).serialize(serializer)
 }
 
 #[cfg(test)]

@@ -48,7 +48,7 @@ pub struct NetworkCounts {
     pub late_clocks: u64,
     /// The latest of them.
     pub latest_clock: Span,
-    /// SYNCHs that were left out because the token was away.
+    /// SYNCHs that were left out because the token was away or the bus in use.
     pub missed_clocks: u64,
     /// How long the token took to come round to the master.
     pub rotation: Rotation,

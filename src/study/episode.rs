@@ -33,7 +33,7 @@ use super::histogram::Histogram;
 use super::layout::Layout;
 use super::report::{aligned, ranges};
 use super::row::{EventRow, Sink, SlaveRow};
-use super::summary::Distribution;
+use super::summary::{Distribution, map};
 use crate::observation::{Disturbance, Observation, Phase, PllState, SlaveState};
 use crate::time::{Span, Time};
 use crate::wire::Address;
@@ -520,10 +520,6 @@ fn cells(name: String, times: &Distribution) -> Vec<String> {
 /// `once`, `3 times`.
 fn times(count: u64) -> String {
     if count == 1 { "once".to_owned() } else { format!("{count} times") }
-}
-
-fn map<S: Serializer, V: Serialize>(entries: &[(String, V)], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(entries.iter().map(|(key, value)| (key, value)))
 }
 
 /// As a distribution in the summary, without percentiles.

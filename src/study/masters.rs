@@ -8,10 +8,10 @@
 //! | `TokenClaimed` | a claim: the token was lost, but for the first one of a run |
 //! | `MasterMode` | its mode |
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::count::{Counts, Rotation};
-use super::export::decimal::Decimal;
+use super::export::decimal::us_or_null;
 use super::layout::{Layout, MasterLayout};
 use super::live_list::CycleTimes;
 use super::report::aligned;
@@ -203,11 +203,6 @@ const HEADER: &[&str] =
 /// The masters for the report, a line each below their titles.
 pub(super) fn table(masters: &[MasterSummary]) -> Vec<String> {
     aligned(HEADER, &[1, 2, 3], &masters.iter().map(MasterSummary::cells).collect::<Vec<_>>())
-}
-
-#[allow(clippy::ref_option)] // As serde asks for it.
-fn us_or_null<S: Serializer>(span: &Option<Span>, serializer: S) -> Result<S::Ok, S::Error> {
-    span.map(Decimal::us).serialize(serializer)
 }
 
 #[cfg(test)]

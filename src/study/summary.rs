@@ -5,7 +5,7 @@ use serde::{Serialize, Serializer};
 use super::acyclic::AcyclicSummary;
 use super::count::{Counts, LinkCounts, SlaveCounts};
 use super::episode::{EpisodeSummary, Episodes};
-use super::export::decimal::Decimal;
+use super::export::decimal::{Decimal, ms, ms_or_null, ns_or_null, s, us, us_or_null};
 use super::export::thinning::Thinning;
 use super::first_fault::{FirstFault, FirstFaults};
 use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
@@ -207,7 +207,7 @@ pub struct Ring {
     /// The latest of them.
     #[serde(rename = "late_clock_max_us", serialize_with = "us")]
     pub latest: Span,
-    /// SYNCHs that were left out because the token was away for a whole cycle.
+    /// SYNCHs that were left out because the token was away, or the bus in use, for a whole cycle.
     pub missed_clocks: u64,
 }
 
@@ -643,7 +643,11 @@ fn slave(index: usize, facts: &Facts, counts: &Counts, histograms: &Histograms) 
 const fn is_zero(count: &u64) -> bool {
     *count == 0
 }
-fn map<S: Serializer, K: Serialize, V: Serialize>(entries: &[(K, V)], serializer: S) -> Result<S::Ok, S::Error> {
+/// Serializes pairs as a map, in their order.
+pub(super) fn map<S: Serializer, K: Serialize, V: Serialize>(
+    entries: &[(K, V)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     serializer.collect_map(entries.iter().map(|(key, value)| (key, value)))
 }
 #[allow(clippy::trivially_copy_pass_by_ref)] // As serde asks for it.
@@ -652,22 +656,4 @@ fn seen<S: Serializer>(seen: &Seen, serializer: S) -> Result<S::Ok, S::Error> {
 }
 fn phases<S: Serializer>(phases: &[(&'static str, Span)], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(phases.iter().map(|&(phase, span)| (phase, Decimal::ms(span))))
-}
-
-/// Functions that serialize spans as numbers of one unit, by reference as serde asks for it.
-macro_rules! units {
-    ($($function:ident = $decimal:ident of $type:ty;)*) => {$(
-        #[allow(clippy::trivially_copy_pass_by_ref)]
-        fn $function<S: Serializer>(span: &$type, serializer: S) -> Result<S::Ok, S::Error> {
-            Option::<Span>::from(*span).map(Decimal::$decimal).serialize(serializer)
-        }
-    )*};
-}
-units! {
-    s = s of Span;
-    ms = ms of Span;
-    us = us of Span;
-    us_or_null = us of Option<Span>;
-    ns_or_null = ns of Option<Span>;
-    ms_or_null = ms of Option<Span>;
 }

@@ -42,7 +42,8 @@ impl Decimal {
     }
     /// The nearest `f64`.
     pub fn value(self) -> f64 {
-        self.picoseconds as f64 / 10_f64.powi(self.digits as i32)
+        // The power is exact: it has at most 40 bits.
+        self.picoseconds as f64 / 10_u64.pow(self.digits) as f64
     }
 }
 
@@ -63,6 +64,24 @@ impl Serialize for Decimal {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_f64(self.value())
     }
+}
+
+/// Functions that serialize spans as numbers of one unit, a missing one as null; by reference as serde asks for it.
+macro_rules! units {
+    ($($function:ident = $decimal:ident of $type:ty;)*) => {$(
+        #[allow(clippy::trivially_copy_pass_by_ref)]
+        pub(in crate::study) fn $function<S: Serializer>(span: &$type, serializer: S) -> Result<S::Ok, S::Error> {
+            Option::<Span>::from(*span).map(Decimal::$decimal).serialize(serializer)
+        }
+    )*};
+}
+units! {
+    s = s of Span;
+    ms = ms of Span;
+    us = us of Span;
+    us_or_null = us of Option<Span>;
+    ns_or_null = ns of Option<Span>;
+    ms_or_null = ms of Option<Span>;
 }
 
 #[cfg(test)]

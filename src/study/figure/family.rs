@@ -138,7 +138,7 @@ pub const FAMILIES: &[Family] = &[
     Family { name: "auto_clears", unit: Unit::Count, what: "times that the master went back to Clear on its own", source: "EN 50170-2", of: Of::Network(|f| count(f.counts.network.auto_clears)) },
     Family { name: "late_clocks", unit: Unit::Count, what: "SYNCHs that could not be sent when planned", source: "Model: D1", of: Of::Network(|f| count(f.counts.network.late_clocks)) },
     Family { name: "late_clock.max", unit: Unit::Us, what: "how late the latest SYNCH left", source: "Model: D1", of: Of::Network(|f| span((f.counts.network.late_clocks > 0).then_some(f.counts.network.latest_clock))) },
-    Family { name: "missed_clocks", unit: Unit::Count, what: "SYNCHs left out because the token was away", source: "Model: D1", of: Of::Network(|f| count(f.counts.network.missed_clocks)) },
+    Family { name: "missed_clocks", unit: Unit::Count, what: "SYNCHs left out because the token was away or the bus in use", source: "Model: D1", of: Of::Network(|f| count(f.counts.network.missed_clocks)) },
     Family { name: "tokens_claimed", unit: Unit::Count, what: "tokens claimed by the master after silence, the first one included", source: "EN 50170-2", of: Of::Network(|f| count(f.counts.network.tokens_claimed)) },
     Family { name: "rotation.count", unit: Unit::Count, what: "how often the token came round to the master", source: "EN 50170-2, T_RR", of: Of::Network(|f| count(f.counts.network.rotation.count)) },
     Family { name: "rotation.min", unit: Unit::Us, what: "shortest token rotation time", source: "EN 50170-2, T_RR", of: Of::Network(|f| rotation(&f.counts.network.rotation, |r| r.min)) },
