@@ -114,7 +114,7 @@ fn disturbed(name: &str, sets: &[(&str, &str)], disturbances: &[&str]) -> Scenar
     let path = format!("{}/scenarios/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let mut text = std::fs::read_to_string(&path).expect("a scenario");
     for keys in disturbances {
-        text += &format!("\n[[disturbance]]\n{}\n", keys.replace("; ", "\n"));
+        text.extend(["\n[[disturbance]]\n", &keys.replace("; ", "\n"), "\n"]);
     }
     let sets = [&[("run.duration", "500 ms")], sets].concat();
     let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
