@@ -38,15 +38,15 @@ const ADDED: f64 = 0.45;
 /// Of the sources, one after the other: as many as there can be.
 const COLOURS: [RGBColor; 10] = [
     BLUE,
-    SKY,
     ORANGE,
-    RGBColor(0xF0, 0xE4, 0x42),
     PURPLE,
     GREEN,
+    SKY,
     RGBColor(0x8B, 0x5A, 0x2B),
-    RGBColor(0xD9, 0xBF, 0x9C),
-    RGBColor(0x9A, 0x8B, 0x00),
+    RGBColor(0xF0, 0xE4, 0x42),
     RGBColor(0x44, 0x3A, 0x8C),
+    RGBColor(0x9A, 0x8B, 0x00),
+    RGBColor(0xD9, 0xBF, 0x9C),
 ];
 /// What is left of the window.
 const LEFT: RGBColor = RGBColor(0xBF, 0xE3, 0xD0);
