@@ -56,6 +56,8 @@ Examples:
       What a GSD file says; scenarios use it with device = { gsd = FILE }.
   isodp budget scenarios/gc-jitter.toml
       What uses up the clock window T_PLL_W of each encoder: jitter, crystals, timer grid, loop.
+  isodp tolerance scenarios/gc-jitter.toml --vary master.gc_jitter.half_width --from '100 ns' --to '2 us'
+      How far the master's clock may stray until what the scenario expects no longer holds, and how surely.
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
   isodp run scenarios/reference.toml scenarios/startup.toml --junit verdicts.xml

@@ -3,8 +3,11 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
+use std::process::{Command, Stdio};
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
+use assert_cmd::cargo::cargo_bin;
 use isodp::study::plan::Plan;
 use isodp::study::scenario::Scenario;
 use isodp::study::scenario::disturbance::DISTURBANCES;
@@ -519,4 +522,35 @@ fn what_is_drawn_is_known_of_every_part_of_a_scenario() {
     let lost = |rate: &str| format!("disturbance = [{{ kind = \"lost-telegrams\"{rate} }}]\n{NETWORK}");
     assert_eq!(of(&lost(", rate = \"1 %\""), &[]), ["disturbances"]);
     assert!(of(&lost(", rate = \"100 %\""), &[]).is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_a_search_cleanly() {
+    let room = room("");
+    let call = ["tolerance", "still.toml", "--vary", "slave.3.t_sdr", "--from", "11 tbit", "--to", "100 tbit"];
+    // Before it listens, Ctrl-C ends the program as any other.
+    for wait in [500, 2_000, 10_000, 30_000] {
+        let child = Command::new(cargo_bin!("isodp"))
+            .args(call)
+            .args(["--set", "run.cycles=1000000000"])
+            .current_dir(room.path("."))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        std::thread::sleep(Duration::from_millis(wait));
+        let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+        assert!(killed.success());
+        let output = child.wait_with_output().expect("it ends");
+        if output.status.code().is_none() {
+            continue;
+        }
+        let page = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(output.status.code(), Some(130), "{page}");
+        assert_eq!(page, "stopped after 0 values, 0 runs; nothing is written, and the same call begins again\n");
+        assert!(!room.path("out").exists());
+        return;
+    }
+    panic!("it never listened");
 }

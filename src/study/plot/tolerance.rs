@@ -193,3 +193,68 @@ impl Tolerance {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::all_inside_and_apart;
+    use super::*;
+
+    fn point(x: f64, share: f64, bounds: Option<(f64, f64)>, mark: Mark) -> Point {
+        Point { x, share: (mark != Mark::Refused).then_some(share), bounds, mark }
+    }
+    fn picture(points: Vec<Point>, band: Option<(f64, f64)>, drawn: bool) -> Tolerance {
+        let words = "the limit is between 0.000460000001 ms and 0.000480000001 ms".to_owned();
+        let chance = Chance { good_enough: 0.01, too_much: 0.1, confidence: "95 %".to_owned() };
+        Tolerance {
+            title: "a scenario with a long name: how far can disturbance.12.half_width go from 100 ns towards 2 us?"
+                .to_owned(),
+            answer: "holds up to 0.000460000001 ms, fails from 0.000480000001 ms on".to_owned(),
+            expected: ["slave.each.clock_failures == 0"; 8].join(", "),
+            x: "disturbance.12.half_width [ms]".to_owned(),
+            points,
+            band: band.map(|ends| Band { ends, words }),
+            chance: drawn.then_some(chance),
+            footer: "isodp".to_owned(),
+        }
+    }
+
+    #[test]
+    fn everything_is_inside_and_the_answer_is_named() {
+        let some = |x: f64, share: f64, mark| point(x, share, Some((share / 2.0, (share * 2.0).min(1.0))), mark);
+        let rising = |flip: f64| {
+            vec![
+                point(flip, 0.0, None, Mark::Holds),
+                some(flip + 1.0, 0.004, Mark::Holds),
+                some(flip + 2.0, 0.3, Mark::Unproven),
+                some(flip + 500.0, 1.0, Mark::Fails),
+                point(flip + 900.0, 0.0, None, Mark::Refused),
+            ]
+        };
+        let falling: Vec<_> = rising(5.0).into_iter().rev().collect();
+        for (name, picture) in [
+            ("at the left end", picture(rising(0.0), Some((1.0, 2.0)), true)),
+            ("logarithmic", picture(rising(3.0), Some((4.0, 5.0)), true)),
+            ("at the right end", picture(falling, Some((905.0, 904.999)), true)),
+            ("one value", picture(vec![point(7.0, 1.0, None, Mark::Fails)], None, false)),
+            (
+                "refused",
+                picture(
+                    vec![point(1.0, 0.0, None, Mark::Holds), point(2.0, 0.0, None, Mark::Refused)],
+                    Some((1.0, 2.0)),
+                    false,
+                ),
+            ),
+        ] {
+            let text = picture.draw().unwrap();
+            all_inside_and_apart(name, &text);
+            let named = text.contains("the limit is between");
+            assert_eq!(named, picture.band.is_some(), "{name}");
+            assert_eq!(text.contains("is good enough"), picture.chance.is_some(), "{name}");
+            assert_eq!(
+                text.contains("refused by the scenario"),
+                picture.points.iter().any(|point| point.mark == Mark::Refused)
+            );
+            assert_eq!(text, picture.draw().unwrap());
+        }
+    }
+}
