@@ -91,7 +91,8 @@ const TOLERANCE: &str = "\
 Every value is run with the same seeds, one after the other, until a sequential test (Wald) has an answer: it holds where at
 most --good-enough of the runs fail, and does not where --too-much and more do; each verdict is right in --confidence of
 all cases. Some 31 runs without failure prove that a value holds with the usual shares. Where nothing is drawn, one run decides.
-A value that the scenario refuses ends the search there, and its rule is told. Bounds of shares are those of Clopper and
+A value that the scenario refuses ends the search there, and its rule is told; a key that takes multiples alone, such as
+of 125 us, is searched on their grid. Bounds of shares are those of Clopper and
 Pearson, as if the number of runs had been settled beforehand.
 
 Examples:

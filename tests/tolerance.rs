@@ -151,6 +151,15 @@ fn what_the_scenario_refuses_is_its_end_and_the_rule_is_told() {
     assert!(fs::read_to_string(room.path("out/still/tolerance_master_t_o.csv")).unwrap().contains("\n1000,refused,"));
 }
 
+#[test]
+fn a_key_that_takes_multiples_alone_is_searched_on_their_grid() {
+    let room = room("");
+    let (page, json) = found(&call(&room, "master.t_dp", "2 ms", "0.5 ms"), End::Found);
+    // T_O 625 us, 125 us to the latch, T_I 125 us (manual 3.3.5).
+    assert!(page.contains("\nholds down to 0.875 ms; 0.75 ms is refused by the scenario\n"), "{page}");
+    assert_eq!((&json["step"], &json["inversions"]), (&"0.125 ms".into(), &Value::Array(Vec::new())), "{page}");
+}
+
 /// The probability that losses with probability `p` in each of so many cycles make the counter exceed what is tolerated:
 /// a loss adds 10, a good cycle takes 1 (manual 2.1.3; Model: D16).
 fn trips(p: f64, cycles: usize, tolerated: usize) -> f64 {

@@ -113,15 +113,16 @@ impl From<ExportError> for ToleranceError {
 /// Never: a scale has two ends.
 pub fn tolerance(call: &Call, stop: &AtomicBool, mut watch: impl FnMut(Progress)) -> Result<Answer, ToleranceError> {
     let (key, scale, demand) = (key(call)?, scale(call)?, demand(call)?);
-    let first = call.first.as_ref().map_or(Ok(scale.last()), |text| {
-        let number = measured(text).and_then(|value| scale.nearest(value));
-        number.map_err(|fault| wrong("--first", text, fault))
-    })?;
     let base = base(call)?;
     let mut sets = call.sets.clone();
     for text in &call.expects {
         sets.push(expectation(text)?);
     }
+    let scale = taken(&base, &sets, &key, scale);
+    let first = call.first.as_ref().map_or(Ok(scale.last()), |text| {
+        let number = measured(text).and_then(|value| scale.nearest(value));
+        number.map_err(|fault| wrong("--first", text, fault))
+    })?;
     let trial = Trial::new((&base, &sets), (&key, &scale), &demand, (call.threads, stop))?;
     let scenario = trial.scenario(0).map_err(|error| blame(error, call, &key, &scale.text(0)))?;
     if scenario.expectations.is_empty() {
@@ -173,6 +174,20 @@ fn write(outcome: &Outcome, dir: &std::path::Path) -> Result<Vec<String>, Tolera
     }
     Staged::place_all(staged)?;
     Ok(names.into())
+}
+
+/// `scale`, or a coarser one where the scenario takes the value next to the beginning on that alone.
+fn taken(base: &Base, sets: &[(String, String)], key: &str, scale: Scale) -> Scale {
+    let takes = |scale: &Scale, number| {
+        let mut sets = sets.to_vec();
+        sets.push((key.to_owned(), scale.text(number)));
+        base.with(&sets).is_ok()
+    };
+    if !takes(&scale, 0) || takes(&scale, 1) {
+        return scale;
+    }
+    let coarser = scale.coarser().find(|coarser| takes(coarser, 1));
+    coarser.unwrap_or(scale)
 }
 
 /// `fault` of an option.

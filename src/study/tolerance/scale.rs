@@ -72,6 +72,35 @@ impl Scale {
         // What the farthest number can be reckoned with, all can.
         scale.on_grid(scale.last).map(|_| scale).ok_or_else(too_fine)
     }
+    /// The same ends and resolution on coarser grids, the finest first: for a key that takes only values of a grid of its
+    /// own, such as multiples of 125 us or of 1/12 us. Nothing where a step was asked for.
+    pub fn coarser(&self) -> impl Iterator<Item = Self> {
+        /// Of every power of ten; 125 us is T_BASE_DP and T_BASE_IO of most devices.
+        const PARTS: [&str; 5] = ["1", "1.25", "2", "2.5", "5"];
+        /// The unit of times in Set_Prm (manual 3.3).
+        const ISO: &str = "1000 tick";
+        let powers = (-9..=9).map(|power: i32| match power {
+            0.. => (1_000_000_000_i128 / 10_i128.pow(9 - power as u32), 1),
+            _ => (1, 10_i128.pow(power.unsigned_abs())),
+        });
+        let of_ten = powers.flat_map(|(above, below)| {
+            let unit = Measure::read(format!("1 {}", self.from.unit).trim());
+            PARTS.into_iter().filter_map(move |part| {
+                let (unit, part) = (unit?, Measure::read(part)?.steps());
+                let (of, per) = unit.steps();
+                unit.with_steps((
+                    of.checked_mul(part.0)?.checked_mul(above)?,
+                    per.checked_mul(part.1)?.checked_mul(below)?,
+                ))
+            })
+        });
+        let mut steps: Vec<_> = of_ten.chain(Measure::read(ISO)).filter(|step| step.is_like(self.from)).collect();
+        let order = |a: &Measure, b: &Measure| a.compare(*b).unwrap_or(std::cmp::Ordering::Equal);
+        steps.retain(|step| self.resolution > 0.0 && step.steps().1 == 1 && order(&self.step, step).is_lt());
+        steps.sort_by(order);
+        let (ends, resolution) = (self.ends(), self.resolution);
+        steps.into_iter().filter_map(move |step| Self::new(ends, step, resolution).ok()).filter(|scale| scale.last > 1)
+    }
     /// Number of the last value, at least 1.
     pub const fn last(&self) -> i64 {
         self.last
@@ -258,6 +287,32 @@ mod tests {
         // Towards zero and beyond no relative distance is small enough: the grid ends it.
         let (holds, fails, _) = found(&resolved("-50 ppm", "50 ppm", 0.01), |ppm| ppm <= 0.0);
         assert_eq!((holds.as_str(), fails.as_str()), ("0 ppm", "0.05 ppm"));
+    }
+
+    #[test]
+    fn coarser_grids_have_the_steps_that_keys_ask_for() {
+        let steps =
+            |from, to| resolved(from, to, 0.01).coarser().map(|scale| scale.step().to_string()).collect::<Vec<_>>();
+        assert_eq!(
+            steps("2 ms", "0.5 ms"),
+            [
+                "0.01 ms",
+                "0.0125 ms",
+                "0.02 ms",
+                "0.025 ms",
+                "0.05 ms",
+                "0.1 ms",
+                "0.125 ms",
+                "0.2 ms",
+                "0.25 ms",
+                "0.5 ms",
+                "1 ms",
+                "1.25 ms"
+            ]
+        );
+        assert!(steps("1 us", "2 us").contains(&"1000 tick".to_owned()));
+        assert_eq!(steps("1", "9"), ["2", "5"]);
+        assert_eq!(stepped("1 ms", "9 ms", "1 ms").unwrap().coarser().count(), 0);
     }
 
     #[test]
