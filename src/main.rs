@@ -24,6 +24,8 @@ use isodp::study::sweep::command::{Call, End, Progress as SweepProgress, join, s
 use isodp::study::sweep::crew::cores;
 use isodp::study::sweep::is_at_work;
 use isodp::study::sweep::shard::Shard;
+use isodp::study::tolerance::command::{self as tolerance, Call as ToleranceCall, End as ToleranceEnd};
+use isodp::study::tolerance::trial::Progress as ToleranceProgress;
 use isodp::study::what_if::command as what_if;
 use isodp::study::{batch, devices, figure};
 use isodp::time::Span;
@@ -54,6 +56,8 @@ Examples:
       What a GSD file says; scenarios use it with device = { gsd = FILE }.
   isodp budget scenarios/gc-jitter.toml
       What uses up the clock window T_PLL_W of each encoder: jitter, crystals, timer grid, loop.
+  isodp tolerance scenarios/gc-jitter.toml --vary master.gc_jitter.half_width --from '100 ns' --to '2 us'
+      How far the master's clock may stray until what the scenario expects no longer holds, and how surely.
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
   isodp run scenarios/reference.toml scenarios/startup.toml --junit verdicts.xml
@@ -83,6 +87,26 @@ Examples:
 
 Exit codes of compare: 0 nothing moved beyond its tolerance, 1 a figure did, 2 wrong usage, file, or baseline.";
 
+const TOLERANCE: &str = "\
+Every value is run with the same seeds, one after the other, until a sequential test (Wald) has an answer: it holds where at
+most --good-enough of the runs fail, and does not where --too-much and more do; each verdict is right in --confidence of
+all cases. Some 31 runs without failure prove that a value holds with the usual shares. Where nothing is drawn, one run decides.
+A value that the scenario refuses ends the search there, and its rule is told; a key that takes multiples alone, such as
+of 125 us, is searched on their grid. Bounds of shares are those of Clopper and
+Pearson, as if the number of runs had been settled beforehand.
+
+Examples:
+  isodp tolerance scenarios/gc-jitter.toml --vary master.gc_jitter.half_width --from '100 ns' --to '2 us' --step '20 ns'
+      How much the master's clock may stray until what the scenario expects no longer holds.
+  isodp tolerance scenarios/fast-cycle.toml --vary master.t_dp --from '2 ms' --to '0.5 ms' --step '125 us' --expect 'faults == 0'
+      The shortest T_DP.
+  isodp tolerance scenarios/fast-cycle.toml --vary slave.#1.t_sdr --from '11 tbit' --to '255 tbit' --step '1 tbit'
+      How slowly all slaves may answer together.
+
+Files: tolerance_<key>.csv, .json and .svg.
+Exit codes of tolerance: 0 it holds at least where the search begins, 1 not even there, 2 wrong usage, scenario or file, 130
+stopped by Ctrl-C; nothing is written then.";
+
 /// Simulates isochronous PROFIBUS DP (DP-V2) networks, telegram by telegram, in deterministic time.
 #[derive(Parser)]
 #[command(version, about, after_help = EXAMPLES)]
@@ -111,6 +135,9 @@ enum Command {
     /// Joins the parts of a sweep that several machines ran with isodp sweep --shard.
     #[command(after_help = SWEEP_CODES)]
     Merge(MergeArgs),
+    /// Finds how far one value of a scenario can go until what is expected no longer holds, and how surely.
+    #[command(after_help = TOLERANCE)]
+    Tolerance(Box<ToleranceArgs>),
     /// Keeps what a scenario comes to, every figure and where to look for a difference, in a file to compare with later.
     #[command(after_help = REGRESSION)]
     Baseline(BaselineArgs),
@@ -173,6 +200,57 @@ struct SweepArgs {
     /// Lists all runs with their parameters, seeds and keys, and what is done of them, and runs nothing.
     #[arg(long)]
     plan: bool,
+}
+
+#[derive(Args)]
+struct ToleranceArgs {
+    /// Scenario file (TOML).
+    #[arg(value_name = "FILE")]
+    scenario: PathBuf,
+    /// The key of the scenario that is varied, as --set names it, for example master.gc_jitter.half_width.
+    #[arg(long, value_name = "KEY")]
+    vary: String,
+    /// Where the search begins: a value that is expected to hold, such as '100 ns', '50 ppm', '1 %' or 3.
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    from: String,
+    /// Where it ends: a value that is expected to fail, larger or smaller.
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    to: String,
+    /// Tries values that are whole steps from the beginning.
+    #[arg(long, value_name = "V", conflicts_with = "resolution")]
+    step: Option<String>,
+    /// Tries values that differ by at least this share of the value; without it and --step 1 %.
+    #[arg(long, value_name = "P")]
+    resolution: Option<String>,
+    /// Goes from the beginning over this value, then twice as far each time; without it, halves from the end.
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    first: Option<String>,
+    /// What is expected instead of the scenario's own [expect], for example 'faults == 0'. May be given several times.
+    #[arg(long = "expect", value_name = "FIGURE=CONDITION")]
+    expects: Vec<String>,
+    /// How often a verdict on a value is right at least [default: 95 %].
+    #[arg(long, value_name = "P")]
+    confidence: Option<String>,
+    /// A share of failing runs that is good enough, 0 for none [default: 1 %].
+    #[arg(long, value_name = "P")]
+    good_enough: Option<String>,
+    /// A share of failing runs that is too much [default: 10 %].
+    #[arg(long, value_name = "P")]
+    too_much: Option<String>,
+    /// Most runs of a value, which fails if they do not prove that it holds [default: 200; 1 where nothing is drawn].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    limit: Option<u64>,
+    /// Further values on either side of the answer, to see whether it holds again or fails before.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=1_000))]
+    probes: u32,
+    /// Runs at the same time; without it one per core. The answer is the same.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Directory for the results; they go to DIR/<scenario>/.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    #[command(flatten)]
+    changes: Changes,
 }
 
 #[derive(Args)]
@@ -338,6 +416,7 @@ fn main() -> ExitCode {
         Command::Replay(args) => replay_command(args).map(done),
         Command::Sweep(args) => sweep_command(args),
         Command::Merge(args) => merge_command(&args),
+        Command::Tolerance(args) => tolerance_command(*args),
         Command::Baseline(args) => baseline_command(args).map(done),
         Command::Compare(args) => compare_command(args),
         Command::Devices(args) => devices_command(args.name.as_deref()).map(done),
@@ -452,21 +531,63 @@ fn replay_command(args: ReplayArgs) -> Result<String, Box<dyn std::error::Error>
 
 fn sweep_command(args: SweepArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
     let SweepArgs { file, out, threads, shard, plan } = args;
-    let stop = Arc::new(AtomicBool::new(false));
-    let told = Arc::clone(&stop);
-    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))?;
-    let usual = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        // The page names every run that breaks off.
-        if !is_at_work() {
-            usual(panic);
-        }
-    }));
+    let stop = stop_on_ctrl_c()?;
+    quiet_runs();
     let bar = SweepBar::new();
     let threads = threads.map_or_else(cores, usize::from);
     let answer = sweep(&Call { file, out, threads, shard, plan }, &stop, |at| bar.show(at))?;
     bar.0.finish_and_clear();
     Ok((answer.page, code(answer.end)))
+}
+
+/// What Ctrl-C sets.
+fn stop_on_ctrl_c() -> Result<Arc<AtomicBool>, ctrlc::Error> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let told = Arc::clone(&stop);
+    ctrlc::set_handler(move || told.store(true, Ordering::Relaxed))?;
+    Ok(stop)
+}
+
+/// Says nothing of a run that breaks off: the page names it.
+fn quiet_runs() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !is_at_work() {
+            usual(panic);
+        }
+    }));
+}
+
+fn tolerance_command(args: ToleranceArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
+    let stop = stop_on_ctrl_c()?;
+    quiet_runs();
+    let call = ToleranceCall {
+        file: args.scenario,
+        sets: args.changes.sets(),
+        out: args.out,
+        vary: args.vary,
+        from: args.from,
+        to: args.to,
+        step: args.step,
+        resolution: args.resolution,
+        first: args.first,
+        expects: args.expects,
+        confidence: args.confidence,
+        good_enough: args.good_enough,
+        too_much: args.too_much,
+        limit: args.limit,
+        probes: args.probes,
+        threads: args.threads.map_or_else(cores, usize::from),
+    };
+    let bar = ToleranceBar::new();
+    let answer = tolerance::tolerance(&call, &stop, |at| bar.show(&at))?;
+    bar.0.finish_and_clear();
+    let code = match answer.end {
+        ToleranceEnd::Found => ExitCode::SUCCESS,
+        ToleranceEnd::Nowhere => ExitCode::from(VIOLATED),
+        ToleranceEnd::Stopped => ExitCode::from(STOPPED),
+    };
+    Ok((answer.page, code))
 }
 
 fn merge_command(args: &MergeArgs) -> Result<(String, ExitCode), Box<dyn std::error::Error>> {
@@ -566,5 +687,23 @@ impl SweepBar {
         if at.failed > 0 {
             self.0.set_message(format!(", {} failed", at.failed));
         }
+    }
+}
+
+/// The progress line of a search, whose end nobody knows.
+struct ToleranceBar(ProgressBar);
+
+impl ToleranceBar {
+    fn new() -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        let style = ProgressStyle::with_template("{spinner} {msg}  {elapsed}");
+        bar.set_style(style.expect("a template that is right"));
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self(bar)
+    }
+
+    fn show(&self, at: &ToleranceProgress) {
+        let ToleranceProgress { value, values, runs, failures } = at;
+        self.0.set_message(format!("{values} values done, {value}: {runs} runs, {failures} failed"));
     }
 }

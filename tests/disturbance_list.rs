@@ -9,7 +9,7 @@ use isodp::study::scenario::disturbance::{COMMON, DISTURBANCES};
 use crate::support::Run;
 
 /// Two masters, two encoders, and a reader of parameters.
-const NETWORK: &str = r#"
+pub(crate) const NETWORK: &str = r#"
 [run]
 duration = "1200 ms"
 

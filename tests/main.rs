@@ -36,6 +36,7 @@ mod statistics;
 mod support;
 mod swarm;
 mod sweep;
+mod tolerance;
 mod topology;
 mod verdicts;
 mod what_if;

@@ -19,7 +19,7 @@ use crate::sim::fault::clock::{CrystalFault, Pull};
 use crate::sim::fault::instant::{InstantFault, Straying};
 use crate::sim::fault::line::{Line, LineFault};
 use crate::sim::fault::order::OrderFault;
-use crate::sim::fault::source::{Source, SourceFault};
+use crate::sim::fault::source::{Emission, Source, SourceFault};
 use crate::sim::fault::station::{Apart, StationFault};
 use crate::sim::fault::turn::Turns;
 use crate::sim::fault::window::Window;
@@ -64,6 +64,21 @@ pub enum What {
 }
 
 impl What {
+    /// Whether chance has a say: whether it draws anything in a run.
+    pub fn draws(&self) -> bool {
+        match self {
+            Self::Line(fault) => fault.draws(),
+            Self::Source(source) => matches!(source.what, Emission::Noise { .. }),
+            Self::Crystal(_, fault) => matches!(fault, CrystalFault::Wander { .. }),
+            Self::Instant(
+                _,
+                InstantFault::Receiver { half_width: width } | InstantFault::Answer { up_to: width, .. },
+            )
+            | Self::Repeater(_, width) => *width > Span::ZERO,
+            Self::Clock(jitter, _) => jitter.draws(),
+            Self::Station(..) | Self::Order(..) | Self::Cut(_) => false,
+        }
+    }
     /// The stations that it means, where it names them.
     pub fn stations(&self) -> &[Address] {
         match self {

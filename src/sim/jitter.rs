@@ -171,6 +171,15 @@ impl GcJitter {
     /// The longest T_DP: no parameter is longer (Model: D3).
     pub const LIMIT: Span = Span::from_ms(32);
 
+    /// Whether it draws anything.
+    pub fn draws(&self) -> bool {
+        match *self {
+            Self::Uniform { half_width: width }
+            | Self::Normal { sigma: width }
+            | Self::BoundedNormal { sigma: width, .. } => width > Span::ZERO,
+            Self::None | Self::Sine { .. } | Self::Step { .. } | Self::Drift { .. } | Self::Table { .. } => false,
+        }
+    }
     /// The row of [`KINDS`] for this jitter.
     pub fn kind(&self) -> &'static JitterKind {
         &KINDS[match self {

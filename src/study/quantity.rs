@@ -342,7 +342,8 @@ pub struct Measure {
 
 impl Measure {
     /// The kinds whose units tell them apart.
-    const KINDS: [&'static Kind; 7] = [&TIME, &BITS, &LENGTH, &DEVIATION, &SPEED, &ANGLE, &RATE];
+    /// A `ppm` is one of a frequency here.
+    const KINDS: [&'static Kind; 8] = [&TIME, &BITS, &LENGTH, &DEVIATION, &SPEED, &ANGLE, &SHARE, &RATE];
     /// Most digits of a number: products of a few of them do not overflow.
     const DIGITS: usize = 15;
 
@@ -508,7 +509,7 @@ mod tests {
         assert_eq!(read("1000 us").compare(read("1 ms")), Some(Ordering::Equal));
         assert_eq!(read("1 us").compare(read("1 m")), None);
         assert_eq!(read("1").compare(read("1 m")), None);
-        for text in ["1.5 ms", "-0.25 ns", "1500 rpm", "7", "0.5", "12 Mbit/s", "30 tbit", "0.1 deg"] {
+        for text in ["1.5 ms", "-0.25 ns", "1500 rpm", "7", "0.5", "12 Mbit/s", "30 tbit", "0.1 deg", "2.5 %"] {
             assert_eq!(read(text).to_string(), text);
         }
         assert_eq!(read("1.50 ms").decimal_in(read("1 us")).unwrap(), "1500");

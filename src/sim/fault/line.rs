@@ -25,6 +25,16 @@ pub struct LineFault {
     pub effect: Effect,
 }
 
+impl LineFault {
+    /// Whether it draws anything.
+    pub const fn draws(&self) -> bool {
+        match self.effect {
+            Effect::Bits { .. } | Effect::Late { random: true, .. } => true,
+            _ => self.manner.is_chance(),
+        }
+    }
+}
+
 /// What becomes of a telegram.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Effect {
@@ -141,10 +151,7 @@ impl Line {
         fault: LineFault,
         (seed, stations): (u64, &[Address]),
     ) {
-        let chance = match fault.effect {
-            Effect::Bits { .. } | Effect::Late { random: true, .. } => true,
-            _ => fault.manner.is_chance(),
-        };
+        let chance = fault.draws();
         let mut draws = Vec::new();
         for station in stations.iter().filter(|&&station| chance && fault.which.from.is_none_or(|from| from == station))
         {

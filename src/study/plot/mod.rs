@@ -31,6 +31,7 @@ mod telegrams;
 #[cfg(test)]
 mod tests;
 mod timeline;
+pub mod tolerance;
 mod topology;
 
 pub use distribution::{Distribution, Distributions, LinkLatencies};

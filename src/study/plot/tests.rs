@@ -571,7 +571,7 @@ fn the_kept_bus_cycle_has_a_gap_poll_if_one_was_complete() {
 
 #[test]
 fn every_file_of_this_folder_is_registered_or_serves_the_others() {
-    const SERVING: [&str; 12] = [
+    const SERVING: [&str; 13] = [
         "mod",
         "plan",
         "budget",
@@ -584,6 +584,7 @@ fn every_file_of_this_folder_is_registered_or_serves_the_others() {
         "sweep",
         "telegrams",
         "tests",
+        "tolerance",
     ];
     let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/study/plot");
     let stem = |path: &Path| path.file_stem().unwrap().to_string_lossy().into_owned();

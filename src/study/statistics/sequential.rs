@@ -146,13 +146,10 @@ impl SequentialTest {
     /// # Errors
     /// Those of `fails`.
     pub fn run<E>(&self, mut fails: impl FnMut(u64) -> Result<bool, E>) -> Result<Tested, E> {
-        let (mut runs, mut failures) = (0, 0);
+        let mut tally = Tally::new(*self);
         loop {
-            failures += u64::from(fails(runs)?);
-            runs += 1;
-            let decision = self.decide(failures, runs);
-            if let Some(verdict) = decision.verdict() {
-                return Ok(Tested { verdict, proven: decision == Decision::Proven(verdict), runs, failures });
+            if let Some(tested) = tally.count(fails(tally.runs())?) {
+                return Ok(tested);
             }
         }
     }
@@ -191,6 +188,34 @@ impl SequentialTest {
 /// `count` times `each`; nothing of something endless is nothing.
 fn weighed(count: f64, each: f64) -> f64 {
     if count > 0.0 { count * each } else { 0.0 }
+}
+
+/// A test under way: runs are counted one by one, in the order of their numbers.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Tally {
+    test: SequentialTest,
+    runs: u64,
+    failures: u64,
+}
+
+impl Tally {
+    /// No run yet.
+    pub const fn new(test: SequentialTest) -> Self {
+        Self { test, runs: 0, failures: 0 }
+    }
+    /// How many runs were counted.
+    pub const fn runs(&self) -> u64 {
+        self.runs
+    }
+    /// Counts the next run; what the test came to, if it needs no more.
+    pub fn count(&mut self, fails: bool) -> Option<Tested> {
+        self.failures += u64::from(fails);
+        self.runs += 1;
+        let (runs, failures) = (self.runs, self.failures);
+        let decision = self.test.decide(failures, runs);
+        let tested = |verdict| Tested { verdict, proven: decision == Decision::Proven(verdict), runs, failures };
+        decision.verdict().map(tested)
+    }
 }
 
 /// What a test of one point came to.

@@ -93,7 +93,12 @@ pub(super) fn plain(value: &str) -> &str {
 
 /// A key as an override names it.
 fn key(node: &Node) -> Result<String, Fault> {
-    match text(node)?.trim() {
+    key_of(text(node)?)
+}
+
+/// `text` as a key of a scenario that can take several values.
+pub(in crate::study) fn key_of(text: &str) -> Result<String, Fault> {
+    match text.trim() {
         "run.seed" => Err(Fault::new("seeds are no parameter")
             .rule("each repetition of a combination has its own seed")
             .help("write repetitions = 10")),
@@ -150,7 +155,12 @@ fn measure(node: &Node) -> Result<Measure, Fault> {
         Value::Integer(_) | Value::Fraction(_) => node.value.literal(),
         other => return Err(Fault::new(format!("this is {}", other.noun())).help("such as \"125 us\" or 3")),
     };
-    let found = Measure::read(&written);
+    measured(&written)
+}
+
+/// The number with its unit, or the number, that was `written`.
+pub(in crate::study) fn measured(written: &str) -> Result<Measure, Fault> {
+    let found = Measure::read(written);
     let found = found
         .ok_or_else(|| Fault::new(format!("\"{written}\" is no number with a unit")).help("such as \"125 us\""))?;
     whole_ticks(found)?;
@@ -221,7 +231,7 @@ fn range(s: &mut Section<'_>, reader: &mut Reader<'_>, keys: usize) -> Option<Ve
 }
 
 /// Refuses ends that are not of one kind or are the same.
-fn like(from: Measure, to: Measure) -> Result<(), Fault> {
+pub(in crate::study) fn like(from: Measure, to: Measure) -> Result<(), Fault> {
     if !from.is_like(to) {
         return Err(Fault::new(format!("\"{from}\" and \"{to}\" are not of one kind")));
     }
@@ -282,13 +292,13 @@ fn stepped(from: Measure, to: Measure, step: Measure) -> Result<Vec<String>, Fau
 }
 
 /// How far it is from one to the other, a fraction; none if it is out of reach.
-fn distance(from: Measure, to: Measure) -> Option<(i128, i128)> {
+pub(in crate::study) fn distance(from: Measure, to: Measure) -> Option<(i128, i128)> {
     let ((above, below), (other, other_below)) = (from.steps(), to.steps());
     let difference = other.checked_mul(below)?.checked_sub(above.checked_mul(other_below)?)?;
     Some((difference.checked_abs()?, below.checked_mul(other_below)?))
 }
 
-fn too_fine() -> Fault {
+pub(in crate::study) fn too_fine() -> Fault {
     Fault::new("this range is too fine to reckon with")
 }
 

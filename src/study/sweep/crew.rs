@@ -18,7 +18,7 @@ pub fn cores() -> usize {
 ///
 /// # Errors
 /// Whatever `take` says.
-pub(super) fn share<W, R: Send, E>(
+pub(in crate::study) fn share<W, R: Send, E>(
     (threads, jobs): (usize, usize),
     stop: &AtomicBool,
     worker: impl Fn() -> W + Sync,

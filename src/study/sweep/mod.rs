@@ -10,6 +10,7 @@
 //! ended the sweep before and however its file has grown since. Tables are written from the journal in the order of the
 //! plan, so that they do not tell how many threads, calls or machines there were.
 
+mod attempt;
 pub mod axis;
 pub mod combination;
 pub mod command;
@@ -22,11 +23,12 @@ mod page;
 pub mod parameter;
 mod picture;
 pub mod plan;
-mod results;
+pub(super) mod results;
 pub mod shard;
 pub mod skip;
 pub mod store;
 mod summary;
 mod worker;
 
-pub use worker::is_at_work;
+pub(super) use attempt::attempt;
+pub use attempt::is_at_work;

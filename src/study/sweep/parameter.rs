@@ -18,6 +18,14 @@ pub struct Column {
     unit: Option<Measure>,
 }
 
+/// The name of a column for values of the key `name` in `unit`, which may be empty.
+pub(in crate::study) fn named(name: &str, unit: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    let name: String = name.replace('#', "").chars().map(plain).collect();
+    let unit = unit.replace('/', "_per_").replace('%', "percent");
+    if unit.is_empty() { name } else { format!("{name}_{unit}") }
+}
+
 impl Column {
     /// The columns of a sweep: of each axis its labels, if it has some, then its keys.
     pub fn of(definition: &Definition) -> Vec<Self> {
@@ -39,9 +47,7 @@ impl Column {
             all.into_iter().all(|value| value.is_some_and(|value| value.is_like(*first)))
         };
         column.unit = first.filter(fits);
-        let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-        let name: String = name.replace('#', "").chars().map(plain).collect();
-        column.name = column.unit.map_or(name.clone(), |unit| format!("{name}_{}", unit.unit.replace('/', "_per_")));
+        column.name = named(name, column.unit.map_or("", |unit| unit.unit));
         column
     }
     fn text<'a>(&self, axis: &'a Axis, value: usize) -> &'a str {

@@ -75,20 +75,20 @@ pub(super) fn cell(value: Value, unit: Unit) -> String {
 }
 
 /// A CSV file under its temporary name.
-pub(super) struct Table {
+pub(in crate::study) struct Table {
     writer: Writer<Staged>,
     path: PathBuf,
 }
 
 impl Table {
-    pub(super) fn create(dir: &Path, name: &str) -> Result<Self, StoreError> {
+    pub(in crate::study) fn create(dir: &Path, name: &str) -> Result<Self, StoreError> {
         Ok(Self { writer: Writer::from_writer(Staged::create(dir, name)?), path: dir.join(name) })
     }
-    pub(super) fn row(&mut self, cells: impl Iterator<Item = String>) -> Result<(), StoreError> {
+    pub(in crate::study) fn row(&mut self, cells: impl Iterator<Item = String>) -> Result<(), StoreError> {
         let written = self.writer.write_record(cells);
         written.map_err(|error| self.error(io::Error::other(error)))
     }
-    pub(super) fn finish(self) -> Result<Staged, StoreError> {
+    pub(in crate::study) fn finish(self) -> Result<Staged, StoreError> {
         let path = self.path;
         let error = |error: csv::IntoInnerError<_>| ExportError::Write { path, source: error.into_error() };
         Ok(self.writer.into_inner().map_err(error)?)

@@ -1,30 +1,16 @@
 //! Worker: does one run after the other on its thread, in the memory of the one before.
 
-use std::any::Any;
-use std::cell::Cell;
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::attempt::attempt;
 use super::definition::Definition;
 use super::journal::{Failure, Record};
 use super::plan::{Base, Job, Plan};
-use crate::sim::network::NetworkEvent;
-use crate::sim::queue::NearQueue;
 use crate::study::figure::{Figure, Figures, Value};
 use crate::study::histogram::Histograms;
-use crate::study::measure::measure;
 use crate::study::scenario::Scenario;
 use crate::study::verdict::judge;
-
-thread_local! {
-    static AT_WORK: Cell<bool> = const { Cell::new(false) };
-}
-
-/// Whether a run is under way on this thread. What a panic of it says goes into its record, and need not be told twice.
-pub fn is_at_work() -> bool {
-    AT_WORK.get()
-}
 
 /// What a thread keeps from run to run.
 #[derive(Default)]
@@ -38,39 +24,25 @@ impl Worker {
     /// Does one run of `plan`. None if `stop` was set before its end.
     pub(super) fn run(&mut self, plan: &Plan, base: &Base, job: Job, stop: &AtomicBool) -> Option<Record> {
         let (key, seed) = (job.key, job.seed);
-        let failed = |reason, cycle| {
-            let failure = Some(Failure { reason, cycle });
-            Some(Record { key, seed, figures: BTreeMap::new(), broken: None, failure })
-        };
+        let failed =
+            |failure| Some(Record { key, seed, figures: BTreeMap::new(), broken: None, failure: Some(failure) });
         if self.scenario.as_ref().is_none_or(|&(number, _)| number != job.combination) {
             match base.with(&plan.sets(job.combination)) {
                 Ok(scenario) => self.scenario = Some((job.combination, scenario)),
-                Err(error) => return failed(error.to_string(), 0),
+                Err(error) => return failed(Failure { reason: error.to_string(), cycle: 0 }),
             }
         }
         let (_, scenario) = self.scenario.as_mut()?;
         scenario.run.seed = seed;
-        let mut cycle = 0;
-        let used = self.histograms.take();
-        AT_WORK.set(true);
-        // What the run has touched is thrown away where it fails.
-        let measured = catch_unwind(AssertUnwindSafe(|| {
-            measure::<NearQueue<NetworkEvent>>(scenario, used, |progress| {
-                cycle = progress.cycles.saturating_sub(1);
-                !stop.load(Ordering::Relaxed)
-            })
-        }));
-        AT_WORK.set(false);
-        match measured {
-            Ok(Ok(Some(figures))) => {
+        match attempt(scenario, self.histograms.take(), || !stop.load(Ordering::Relaxed)) {
+            Ok(Some(figures)) => {
                 let broken = broken(scenario, &figures);
                 let record = Record { key, seed, figures: collect(&plan.definition, &figures), broken, failure: None };
                 self.histograms = Some(figures.into_histograms());
                 Some(record)
             }
-            Ok(Ok(None)) => None,
-            Ok(Err(no_headway)) => failed(no_headway.to_string(), cycle),
-            Err(panic) => failed(words(&*panic), cycle),
+            Ok(None) => None,
+            Err(failure) => failed(failure),
         }
     }
 }
@@ -86,12 +58,6 @@ fn broken(scenario: &Scenario, figures: &Figures) -> Option<Vec<String>> {
     let verdicts = judge(&scenario.expectations, figures).into_iter();
     let broken = verdicts.filter(|verdict| !verdict.passed).map(|verdict| verdict.figure).collect();
     (!scenario.expectations.is_empty()).then_some(broken)
-}
-
-/// What a panic says.
-fn words(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    format!("the model broke off: {}", text.unwrap_or("without a word"))
 }
 
 #[cfg(test)]
@@ -128,7 +94,7 @@ mod tests {
         assert_eq!(refused.status(), "failed");
         assert!(refused.failure.unwrap().reason.starts_with("scene.toml:"));
         assert_eq!(run(&mut worker, &base(SCENE), jobs[0]), first, "in used memory as in new");
-        assert!(!is_at_work());
+        assert!(!super::super::is_at_work());
     }
 
     #[test]
@@ -137,13 +103,6 @@ mod tests {
         let job = plan.jobs().next().unwrap();
         let stop = AtomicBool::new(true);
         assert_eq!(Worker::default().run(&plan, &base(SCENE), job, &stop), None);
-    }
-
-    #[test]
-    fn what_a_panic_says_is_kept() {
-        assert_eq!(words(&"why"), "the model broke off: why");
-        assert_eq!(words(&"why".to_owned()), "the model broke off: why");
-        assert_eq!(words(&3), "the model broke off: without a word");
     }
 
     #[test]
