@@ -56,8 +56,8 @@ Examples:
       What a GSD file says; scenarios use it with device = { gsd = FILE }.
   isodp budget scenarios/gc-jitter.toml
       What uses up the clock window T_PLL_W of each encoder: jitter, crystals, timer grid, loop.
-  isodp tolerance scenarios/gc-jitter.toml --vary master.gc_jitter.half_width --from '100 ns' --to '2 us'
-      How far the master's clock may stray until what the scenario expects no longer holds, and how surely.
+  isodp tolerance scenarios/gc-jitter.toml --vary master.gc_jitter.half_width --from '100 ns' --to '2 us' --expect 'clock_failures == 0'
+      How far the master's clock may stray until an encoder misses a clock, and how surely.
   isodp run scenarios/reference.toml --set master.t_o='1.5 ms' --set slave.3.crystal='20 ppm'
       The same with changed parameters; slaves are named by their address.
   isodp run scenarios/reference.toml scenarios/startup.toml --junit verdicts.xml
@@ -96,8 +96,9 @@ of 125 us, is searched on their grid. Bounds of shares are those of Clopper and
 Pearson, as if the number of runs had been settled beforehand.
 
 Examples:
-  isodp tolerance scenarios/gc-jitter.toml --vary master.gc_jitter.half_width --from '100 ns' --to '2 us' --step '20 ns'
-      How much the master's clock may stray until what the scenario expects no longer holds.
+  isodp tolerance scenarios/gc-jitter.toml --vary master.gc_jitter.half_width --from '100 ns' --to '2 us' --step '20 ns' \
+      --expect 'clock_failures == 0'
+      How far the master's clock may stray until an encoder misses a clock.
   isodp tolerance scenarios/fast-cycle.toml --vary master.t_dp --from '2 ms' --to '0.5 ms' --step '125 us' --expect 'faults == 0'
       The shortest T_DP.
   isodp tolerance scenarios/fast-cycle.toml --vary slave.#1.t_sdr --from '11 tbit' --to '255 tbit' --step '1 tbit'
