@@ -23,7 +23,7 @@ use isodp::study::count::Counts;
 use isodp::study::metric::Metrics;
 use isodp::study::row::{CycleRow, Sink};
 use isodp::study::scenario::disturbance::DISTURBANCES;
-use isodp::study::scenario::{Extent, Scenario};
+use isodp::study::scenario::{Class2, Extent, Scenario};
 use isodp::study::{build, run};
 use isodp::time::{Local, Span, Time};
 use isodp::wire::{Address, Frame};
@@ -220,7 +220,10 @@ fn judge<Q: Queue<NetworkEvent>>(
         }
     }
     // A message takes a rotation, an answer several of them, and the slaves take turns.
-    for &address in &case.asking {
+    let silent = |slave: &Address| scenario.slaves.iter().any(|other| other.address == *slave && other.silent);
+    let answers = |class2: &Class2| class2.jobs.iter().flat_map(|job| &job.slaves).any(|slave| !silent(slave));
+    let asking = scenario.class2.iter().filter(|class2| answers(class2)).map(|class2| class2.address.get());
+    for address in asking.filter(|address| case.asking.contains(address)) {
         let last = watch.answered.get(&Address::new(address).expect("an address")).copied();
         let patience = Span::from_ms(500) + case.cycle * (60 + 10 * scenario.slaves.len() as i64);
         if last.is_none_or(|last| last < network.now() - patience) {
