@@ -286,16 +286,16 @@ fn try_case(seed: u64, case: Case) -> Tried {
             with_files(&scenario, &case);
         }
         let (run, faults) = faults(&scenario, &case);
-        (run.endless, run.conflicts, faults)
+        (run.endless, run.end, run.conflicts, faults)
     }));
-    let (endless, conflicts, faults) = tried.unwrap_or_else(|panic| {
+    let (endless, end, conflicts, faults) = tried.unwrap_or_else(|panic| {
         let message = panic.downcast_ref::<String>().cloned();
         let message = message.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string));
-        (false, BTreeSet::new(), vec![format!("panic: {}", message.unwrap_or_default())])
+        (false, Time::ZERO, BTreeSet::new(), vec![format!("panic: {}", message.unwrap_or_default())])
     });
     match (endless, faults.is_empty(), conflicts.is_empty()) {
         (_, false, _) => Tried::Wrong(format!("ISODP_SWARM_SEED={seed}\n{}\n{}", faults.join("\n"), case.text)),
-        (_, true, false) => try_case(seed, case.with_restarts(&conflicts)),
+        (_, true, false) => try_case(seed, case.with_restarts(&conflicts, end - Time::ZERO)),
         (true, true, true) => Tried::Endless,
         (false, true, true) => Tried::Well,
     }

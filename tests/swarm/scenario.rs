@@ -54,13 +54,13 @@ pub(super) struct Case {
 }
 
 impl Case {
-    /// The same, with the supply of these masters off for a cycle when all else is over.
-    pub(super) fn with_restarts(mut self, masters: &BTreeSet<Address>) -> Self {
+    /// The same, with the supply of these masters off for a cycle at `at`, when all else is over.
+    pub(super) fn with_restarts(mut self, masters: &BTreeSet<Address>, at: Span) -> Self {
         for master in masters {
-            order(&mut self.text, self.quiet, &format!("do = \"power-off\"\nstation = {master}"));
-            order(&mut self.text, self.quiet + self.cycle, &format!("do = \"power-on\"\nstation = {master}"));
+            order(&mut self.text, at, &format!("do = \"power-off\"\nstation = {master}"));
+            order(&mut self.text, at + self.cycle, &format!("do = \"power-on\"\nstation = {master}"));
         }
-        self.quiet += self.cycle * 2;
+        self.quiet = at + self.cycle * 2;
         self.restarts = true;
         self
     }
