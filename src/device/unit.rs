@@ -199,7 +199,7 @@ impl<F: Function> Unit<F> {
 
     /// As [`Station::step`], where stations of other kinds take orders; a unit does not.
     #[inline]
-    pub fn take<C>(&mut self, now: Local, input: Input<'_, C>, out: &mut Outbox) {
+    pub fn take<C: Copy>(&mut self, now: Local, input: Input<'_, C>, out: &mut Outbox) {
         let heard = matches!(input, Input::Telegram(_));
         match input {
             Input::PowerOn => {

@@ -125,7 +125,9 @@ mod tests {
 
     fn tally(magnitudes: &[u64]) -> Tally {
         let mut tally = Tally::new(LIMIT);
-        magnitudes.iter().for_each(|&magnitude| tally.record(magnitude));
+        for &magnitude in magnitudes {
+            tally.record(magnitude);
+        }
         tally
     }
     fn magnitude() -> impl Strategy<Value = u64> {
@@ -153,7 +155,9 @@ mod tests {
         #[test]
         fn it_tells_what_an_hdr_histogram_tells(magnitudes in prop::collection::vec(magnitude(), 0..60)) {
             let mut hdr = hdrhistogram::Histogram::<u64>::new_with_bounds(1, LIMIT, DIGITS).unwrap();
-            magnitudes.iter().for_each(|&magnitude| hdr.saturating_record(magnitude));
+            for &magnitude in &magnitudes {
+                hdr.saturating_record(magnitude);
+            }
             let told: Vec<_> = hdr
                 .iter_recorded()
                 .map(|step| (step.value_iterated_to(), step.count_at_value()))

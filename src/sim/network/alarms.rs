@@ -40,7 +40,7 @@ impl Alarm {
 #[derive(Clone, Debug)]
 pub(super) struct Alarms {
     /// By the station's slot, then by number.
-    alarms: Vec<[Alarm; KINDS]>,
+    all: Vec<[Alarm; KINDS]>,
     /// For each number the slots that have ever armed theirs.
     users: [Vec<u8>; KINDS],
     /// For each number an instant before which none of it comes, and the earliest of these.
@@ -59,7 +59,7 @@ impl Alarms {
     /// The alarms of so many stations, none of them armed.
     pub(super) fn new(stations: usize) -> Self {
         Self {
-            alarms: vec![[Alarm::OFF; KINDS]; stations],
+            all: vec![[Alarm::OFF; KINDS]; stations],
             users: core::array::from_fn(|_| Vec::with_capacity(stations)),
             nexts: [Time::MAX; KINDS],
             next: Time::MAX,
@@ -72,7 +72,7 @@ impl Alarms {
     /// Arms the one of this number for the reading `at`, whatever it was.
     #[inline]
     pub(super) fn arm(&mut self, (slot, which): (usize, usize), at: Local, crystal: &Crystal, now: Time) {
-        let alarm = &mut self.alarms[slot][which];
+        let alarm = &mut self.all[slot][which];
         alarm.due = at;
         if at < alarm.seen.0 {
             self.bring_forward((slot, which), crystal, now);
@@ -80,7 +80,7 @@ impl Alarms {
     }
     /// It is armed for an earlier reading than it was looked at for.
     fn bring_forward(&mut self, (slot, which): (usize, usize), crystal: &Crystal, now: Time) {
-        let alarm = &mut self.alarms[slot][which];
+        let alarm = &mut self.all[slot][which];
         if alarm.seen == Alarm::UNSEEN && !self.users[which].contains(&(slot as u8)) {
             self.users[which].push(slot as u8);
         }
@@ -91,15 +91,15 @@ impl Alarms {
     /// Disarms the one of this number.
     #[inline]
     pub(super) fn disarm(&mut self, (slot, which): (usize, usize)) {
-        self.alarms[slot][which].due = Local::MAX;
+        self.all[slot][which].due = Local::MAX;
     }
     /// Disarms all of a station.
     pub(super) fn disarm_all(&mut self, slot: usize) {
-        self.alarms[slot].iter_mut().for_each(|alarm| alarm.due = Local::MAX);
+        self.all[slot].iter_mut().for_each(|alarm| alarm.due = Local::MAX);
     }
     /// The station's `crystal` has another rate from `now` on.
     pub(super) fn retune(&mut self, slot: usize, crystal: &Crystal, now: Time) {
-        for (alarm, next) in self.alarms[slot].iter_mut().zip(&mut self.nexts) {
+        for (alarm, next) in self.all[slot].iter_mut().zip(&mut self.nexts) {
             alarm.seen = Alarm::UNSEEN;
             *next = alarm.look(crystal, now).min(*next);
             self.next = self.next.min(*next);
@@ -113,7 +113,7 @@ impl Alarms {
             if *next <= limit {
                 *next = self.users[which].iter().fold(Time::MAX, |next, &slot| {
                     let slot = usize::from(slot);
-                    self.alarms[slot][which].look(crystal(slot), now).min(next)
+                    self.all[slot][which].look(crystal(slot), now).min(next)
                 });
             }
             self.next = self.next.min(*next);
@@ -123,9 +123,9 @@ impl Alarms {
     /// one with the least number.
     pub(super) fn first<K: Ord>(&self, rank: impl Fn(usize) -> K) -> Option<(usize, usize, Local)> {
         let coming = (0..KINDS).filter(|&which| self.nexts[which] == self.next);
-        let all = coming.flat_map(|which| self.users[which].iter().map(move |&slot| (usize::from(slot), which)));
-        let armed = all.filter_map(|(slot, which)| {
-            let Alarm { due, seen } = self.alarms[slot][which];
+        let armed = coming.flat_map(|which| self.users[which].iter().map(move |&slot| (usize::from(slot), which)));
+        let armed = armed.filter_map(|(slot, which)| {
+            let Alarm { due, seen } = self.all[slot][which];
             (due != Local::MAX && seen.1 == self.next).then_some((slot, which, due))
         });
         armed.min_by_key(|&(slot, which, _)| (rank(slot), which))
