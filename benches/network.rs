@@ -3,6 +3,9 @@
 //! ```text
 //! cargo bench --bench network             medians [ns per slave-cycle] and their ratio
 //! cargo bench --bench network -- --test   one short round, only to see that it runs
+//! cargo bench --bench network -- --count network 8 400
+//!                                         nothing but 400 cycles of the network of 8 encoders, for `benches/guard`;
+//!                                         instead of a number also a scenario file
 //! ```
 //!
 //! | column | what runs |
@@ -67,7 +70,48 @@ impl<R: Recorder> Watched<R> {
     }
 }
 
+/// Runs so many cycles. callgrind collects what is inside of it, so it is never a part of its caller.
+#[inline(never)]
+fn counted(cycles: u64, mut run: impl FnMut(u64)) {
+    run(cycles);
+}
+
+/// One contender in operation, then so many cycles of it, once.
+///
+/// # Panics
+/// If the contender is none of `network`, `bare` and `loop`.
+fn count(contender: &str, encoders: &str, cycles: u64) {
+    let scenario = encoders.parse().map_or_else(
+        |_| Scenario::load(encoders.as_ref(), &[]).unwrap_or_else(|error| panic!("{error}")),
+        encoders::scenario,
+    );
+    match contender {
+        "network" => {
+            let layout = run::layout(&scenario);
+            let metrics = Metrics::new(layout.clone(), Speeds::of(&scenario), Histograms::new(&layout));
+            let mut full = Watched::new(&scenario, metrics);
+            counted(cycles, |cycles| full.run(cycles));
+        }
+        "bare" => {
+            let mut bare = Watched::new(&scenario, ());
+            counted(cycles, |cycles| bare.run(cycles));
+        }
+        "loop" => {
+            let (network, start) = encoders::started(&scenario);
+            let mut straight = check::caught_up::<true>(&scenario, &network, &start);
+            counted(cycles, |cycles| straight.run(cycles, &mut ()));
+        }
+        _ => panic!("{contender} is none of network, bare and loop"),
+    }
+}
+
 fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    if let [flag, contender, encoders, cycles] = &arguments[..]
+        && flag == "--count"
+    {
+        return count(contender, encoders, cycles.parse().expect("a number of cycles"));
+    }
     let effort = Effort::of_arguments();
     println!("encoders      T_DP   network [ns]   loop [ns]   ratio   bare [ns]   prints [ns]   flight [ns]");
     for number in [1, 8, 32, 122] {

@@ -108,7 +108,7 @@ fn assert_starts_alike<'a>(
 
 /// Everything that two histograms of the same values have in common.
 fn assert_same(what: &str, loops: &Histogram, networks: &Histogram) {
-    let sides = |histogram: &Histogram| (histogram.positive().clone(), histogram.negative().cloned());
+    let sides = |histogram: &Histogram| (histogram.positive(), histogram.negative());
     let sums = |h: &Histogram| (h.count(), h.min(), h.max(), h.mean(), h.below(), h.above());
     assert_eq!(sums(loops), sums(networks), "{what}: the loop against the network");
     assert_eq!(sides(loops), sides(networks), "{what}: the loop against the network");

@@ -161,6 +161,7 @@ pub(crate) fn started(scenario: &Scenario) -> (Network<Node>, StartUp) {
     let mut start = StartUp { stations: vec![Station::default(); 128], cycle: 0, first: None };
     let operates = |network: &Network<Node>, slave: Address| match network.station(slave) {
         Some(Node::Encoder(encoder)) => encoder.phase() == Phase::Operation,
+        Some(Node::Drive(drive)) => drive.phase() == Phase::Operation,
         _ => false,
     };
     while !scenario.slaves.iter().all(|slave| operates(&network, slave.address)) {

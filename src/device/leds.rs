@@ -131,6 +131,12 @@ impl LedLogic {
     /// Takes over what is the case at `now`; what the LEDs showed and show if this changed.
     pub fn update(&mut self, now: Local, input: LedInput) -> Option<(Leds, Leds)> {
         let from = self.leds;
+        // Data exchange that goes on shows the same, whatever else there is, and needs no deadline.
+        if input.powered && from == Leds::DataExchange && input.state == SlaveState::DataExch {
+            self.heard = if input.heard { Some(now) } else { self.heard };
+            self.deadline = self.deadline.filter(|&deadline| now < deadline);
+            return None;
+        }
         if !input.powered {
             *self = Self::default();
             return (from != self.leds).then_some((from, self.leds));

@@ -91,16 +91,8 @@ impl Station for Node {
                     master.step(now, input, out);
                 }
             }
-            Self::Encoder(encoder) => {
-                if let Some(input) = input.map_command(|_| None) {
-                    encoder.step(now, input, out);
-                }
-            }
-            Self::Drive(drive) => {
-                if let Some(input) = input.map_command(|_| None) {
-                    drive.step(now, input, out);
-                }
-            }
+            Self::Encoder(encoder) => encoder.take(now, input, out),
+            Self::Drive(drive) => drive.take(now, input, out),
             Self::Silent(_) => {}
         }
     }

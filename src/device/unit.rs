@@ -196,6 +196,30 @@ impl<F: Function> Unit<F> {
     pub const fn inputs(&self) -> &Inputs81 {
         &self.body.inputs
     }
+
+    /// As [`Station::step`], where stations of other kinds take orders; a unit does not.
+    #[inline]
+    pub fn take<C: Copy>(&mut self, now: Local, input: Input<'_, C>, out: &mut Outbox) {
+        let heard = matches!(input, Input::Telegram(_));
+        match input {
+            Input::PowerOn => {
+                self.leds = LedLogic::default();
+                self.body.reset(out);
+                self.body.function.leave(out);
+                self.slave.power_on(now, &mut self.body, out);
+            }
+            Input::Telegram(heard) => self.slave.heard(now, heard, &mut self.body, out),
+            Input::Deadline { timer: Timer::Watchdog, .. } => self.slave.watchdog(now, &mut self.body, out),
+            Input::Deadline { timer: Timer::Connection, .. } => self.slave.connection_due(now, &mut self.body, out),
+            Input::Deadline { timer: Timer::Window, .. } => self.body.window_closed(now, out),
+            Input::Deadline { timer: Timer::SetPoint, .. } => self.body.set_point(now, out),
+            Input::Deadline { timer: Timer::Links, .. } => self.body.function.monitor(now, out),
+            Input::Sample(raw) if self.slave.state() == SlaveState::DataExch => self.body.latch(raw, true, out),
+            Input::Deadline { .. } | Input::Sent | Input::Sample(_) => {}
+            Input::Command(_) => return,
+        }
+        self.update_leds(now, heard, out);
+    }
 }
 
 impl<F: Function> Body<F> {
@@ -474,24 +498,6 @@ impl<F: Function> Station for Unit<F> {
         self.slave.filter(&self.body)
     }
     fn step(&mut self, now: Local, input: Input<'_, Self::Command>, out: &mut Outbox) {
-        let heard = matches!(input, Input::Telegram(_));
-        match input {
-            Input::PowerOn => {
-                self.leds = LedLogic::default();
-                self.body.reset(out);
-                self.body.function.leave(out);
-                self.slave.power_on(now, &mut self.body, out);
-            }
-            Input::Telegram(heard) => self.slave.heard(now, heard, &mut self.body, out),
-            Input::Deadline { timer: Timer::Watchdog, .. } => self.slave.watchdog(now, &mut self.body, out),
-            Input::Deadline { timer: Timer::Connection, .. } => self.slave.connection_due(now, &mut self.body, out),
-            Input::Deadline { timer: Timer::Window, .. } => self.body.window_closed(now, out),
-            Input::Deadline { timer: Timer::SetPoint, .. } => self.body.set_point(now, out),
-            Input::Deadline { timer: Timer::Links, .. } => self.body.function.monitor(now, out),
-            Input::Sample(raw) if self.slave.state() == SlaveState::DataExch => self.body.latch(raw, true, out),
-            Input::Deadline { .. } | Input::Sent | Input::Sample(_) => {}
-            Input::Command(never) => match never {},
-        }
-        self.update_leds(now, heard, out);
+        self.take(now, input, out);
     }
 }

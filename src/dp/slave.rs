@@ -504,6 +504,7 @@ impl Slave {
     ) {
         let from = core::mem::replace(&mut self.state, state);
         out.observe(Observation::SlaveState { from, to: state, cause });
+        out.filter_changed();
         if from == SlaveState::DataExch && state != SlaveState::DataExch {
             self.image.leave();
             self.ms1.reset(app);

@@ -21,7 +21,8 @@ pub trait Station {
     /// The station's own address.
     fn address(&self) -> Address;
 
-    /// Which telegrams this station wants to hear. May change after every step.
+    /// Which telegrams this station wants to hear. A step after which these are others says so
+    /// ([`Outbox::filter_changed`]).
     fn filter(&self) -> Filter;
 
     /// Takes `input`, which happened at `now`, and answers into `out`. `out` is empty on entry; `now` never runs
@@ -96,6 +97,10 @@ impl Filter {
     /// Everything on the line.
     pub const fn all(own: Address) -> Self {
         Self { all: true, own, publishers: 0 }
+    }
+    /// Whether more passes than what is for this station or, from masters, for everybody.
+    pub const fn is_curious(&self) -> bool {
+        self.all || self.publishers != 0
     }
     /// Whether a telegram with this route passes; without a route only stations that hear everything get it.
     #[inline]
@@ -176,11 +181,14 @@ impl Timer {
 pub struct Outbox {
     frame: Frame,
     send: Option<Send>,
-    cycle_at: Option<Local>,
     /// What becomes of the deadlines; an entry counts if its bit in `ordered` is set.
     orders: [Order; Self::DEADLINES],
     ordered: u16,
+    cycle_at: Option<Local>,
     sample_with_telegrams: Option<bool>,
+    filter_changed: bool,
+    /// Any of the three before is set.
+    unusual: bool,
     observations: [Option<Observation>; Self::MAX_OBSERVATIONS],
     observed: usize,
 }
@@ -223,10 +231,12 @@ impl Outbox {
         Self {
             frame: Frame::new(),
             send: None,
-            cycle_at: None,
             orders: [Order::Off; Self::DEADLINES],
             ordered: 0,
+            cycle_at: None,
             sample_with_telegrams: None,
+            filter_changed: false,
+            unusual: false,
             observations: [None; Self::MAX_OBSERVATIONS],
             observed: 0,
         }
@@ -235,10 +245,12 @@ impl Outbox {
     /// Makes it empty for the next step.
     pub fn clear(&mut self) {
         self.send = None;
-        self.cycle_at = None;
         self.ordered = 0;
-        self.sample_with_telegrams = None;
         self.observed = 0;
+        if self.unusual {
+            (self.cycle_at, self.sample_with_telegrams) = (None, None);
+            (self.filter_changed, self.unusual) = (false, false);
+        }
     }
 
     /// Sends the telegram that `fill` writes, its first bit at `at`. One telegram per step.
@@ -259,7 +271,7 @@ impl Outbox {
 
     /// A cycle without clock telegram begins at `at`: [`Input::Sent`] comes then.
     pub fn begin_cycle(&mut self, at: Local) {
-        self.cycle_at = Some(at);
+        (self.cycle_at, self.unusual) = (Some(at), true);
     }
 
     /// Arms `timer`; an earlier arming is forgotten.
@@ -284,7 +296,11 @@ impl Outbox {
     }
     /// From now on every telegram brings the shaft's raw position along, or no more (Model: D8).
     pub fn sample_with_telegrams(&mut self, on: bool) {
-        self.sample_with_telegrams = Some(on);
+        (self.sample_with_telegrams, self.unusual) = (Some(on), true);
+    }
+    /// [`Station::filter`] may say something else from now on.
+    pub fn filter_changed(&mut self) {
+        (self.filter_changed, self.unusual) = (true, true);
     }
     /// Tells what was seen or done.
     pub fn observe(&mut self, observation: Observation) {
@@ -295,6 +311,10 @@ impl Outbox {
     /// The telegram to send, if there is one.
     pub fn sending(&self) -> Option<(Send, &Frame)> {
         self.send.map(|send| (send, &self.frame))
+    }
+    /// The octets of the telegram to send, or of one sent before.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
     }
     /// When a cycle without clock telegram begins, if one does.
     pub fn beginning_cycle(&self) -> Option<Local> {
@@ -309,9 +329,18 @@ impl Outbox {
             Some((which, self.orders[which]))
         })
     }
+    /// Whether a cycle begins, or the shaft's position or other telegrams are wanted than before: what steps seldom say.
+    #[inline]
+    pub fn is_unusual(&self) -> bool {
+        self.unusual
+    }
     /// Whether telegrams shall bring the shaft's position, where that changed.
     pub fn sampling_with_telegrams(&self) -> Option<bool> {
         self.sample_with_telegrams
+    }
+    /// Whether the station may want other telegrams than before.
+    pub fn has_filter_changed(&self) -> bool {
+        self.filter_changed
     }
     /// What was observed, in order.
     pub fn observations(&self) -> impl Iterator<Item = &Observation> {

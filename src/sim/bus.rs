@@ -52,7 +52,7 @@ pub struct Flight {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FlightId(u16);
 
-/// Telegrams kept for telling whether the line is busy somewhere: more are never near each other.
+/// Telegrams kept for telling whether the line is busy somewhere: more are never near each other. A power of two.
 const RECENT: usize = 8;
 
 /// When a telegram was on the line at its sender.
@@ -161,17 +161,14 @@ impl Bus {
         frame: &Frame,
         mark: Mark,
     ) -> (FlightId, Option<usize>) {
-        let id = self.free.pop().unwrap_or_else(|| {
-            let (strays, frame) = (Vec::new(), Frame::new());
-            let flight = Flight { start, end, sender, number: 0, strays, frame, mark, listeners: 0 };
-            self.flights.push(flight);
-            FlightId(self.flights.len() as u16 - 1)
-        });
+        let id = match self.free.pop() {
+            Some(id) => id,
+            None => self.add_flight(mark),
+        };
         let flight = &mut self.flights[usize::from(id.0)];
         flight.frame.copy_from(frame);
         (flight.start, flight.end, flight.sender, flight.listeners) = (start, end, sender, 0);
-        flight.mark = mark;
-        flight.number = self.sent;
+        (flight.mark, flight.number) = (mark, self.sent);
         if !self.jitter.is_empty() {
             flight.strays.clear();
             flight.strays.extend(self.jitter.iter_mut().map(LinkJitter::draw));
@@ -181,6 +178,13 @@ impl Bus {
         self.sent += 1;
         self.clear_from = self.clear_from.max(if mark.apart { end + self.t_syn } else { end });
         (id, hit)
+    }
+    /// Room for one more telegram under way.
+    #[cold]
+    fn add_flight(&mut self, mark: Mark) -> FlightId {
+        let (strays, frame, at) = (Vec::new(), Frame::new(), Time::ZERO);
+        self.flights.push(Flight { start: at, end: at, sender: 0, number: 0, strays, frame, mark, listeners: 0 });
+        FlightId(self.flights.len() as u16 - 1)
     }
     /// Overlapping characters fail their parity, and so receivers drop all telegrams that overlap with this one. What is
     /// apart spoils the idle time before a request too. Returns the sender of one that overlaps, the one that ends last.
@@ -213,7 +217,7 @@ impl Bus {
     fn remember(&mut self, id: FlightId) {
         let kept = self.kept();
         let &Flight { start, end, sender, ref strays, mark: Mark { apart, .. }, .. } = &self.flights[usize::from(id.0)];
-        match self.recent.get_mut(self.sent as usize % kept) {
+        match self.recent.get_mut(self.sent as usize & (kept - 1)) {
             Some(kept) => {
                 (kept.start, kept.end, kept.sender, kept.apart) = (start, end, sender, apart);
                 if !strays.is_empty() {
@@ -237,9 +241,12 @@ impl Bus {
         }
     }
 
-    /// So many stations will hear the end of this telegram.
-    pub fn add_listeners(&mut self, id: FlightId, count: u16) {
-        self.flights[usize::from(id.0)].listeners += count;
+    /// So many stations will hear the end of this telegram, which was just sent.
+    pub fn expect_listeners(&mut self, id: FlightId, count: u16) {
+        self.flights[usize::from(id.0)].listeners = count;
+        if count == 0 {
+            self.free.push(id);
+        }
     }
     /// The telegram, for a listener that hears its end now.
     pub fn flight(&self, id: FlightId) -> &Flight {
@@ -252,11 +259,6 @@ impl Bus {
         if flight.listeners == 0 {
             self.free.push(id);
         }
-    }
-    /// Nobody listens to this telegram.
-    pub fn unheard(&mut self, id: FlightId) {
-        debug_assert_eq!(self.flights[usize::from(id.0)].listeners, 0);
-        self.free.push(id);
     }
     /// When the telegram's last bit reaches the station `listener`, and the number of the telegram.
     #[inline]
@@ -314,9 +316,9 @@ mod tests {
     fn telegrams_that_overlap_are_both_garbled_and_those_that_follow_are_not() {
         let mut bus = line();
         let (a, clean) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
-        bus.add_listeners(a, 1);
+        bus.expect_listeners(a, 1);
         let (b, hit) = bus.send(1, (ns(99), ns(199)), &token(), Mark::OWN);
-        bus.add_listeners(b, 1);
+        bus.expect_listeners(b, 1);
         assert_eq!((clean, hit), (None, Some(0)));
         for id in [a, b] {
             assert!(bus.flight(id).mark.broken);
@@ -331,7 +333,7 @@ mod tests {
         let mut bus = line();
         let mut put = |sender, from, to| {
             let (id, hit) = bus.send(sender, (ns(from), ns(to)), &token(), Mark::OWN);
-            bus.add_listeners(id, 1);
+            bus.expect_listeners(id, 1);
             (id, hit)
         };
         let sent = [put(0, 0, 100), put(1, 50, 150), put(0, 120, 220), put(1, 1_000, 1_100), put(0, 500, 1_000)];
@@ -350,7 +352,7 @@ mod tests {
         answer.set_short_ack();
         let mut put = |from, to, frame: &Frame, mark| {
             let (id, hit) = bus.send(0, (ns(from), ns(to)), frame, mark);
-            bus.add_listeners(id, 1);
+            bus.expect_listeners(id, 1);
             assert_eq!(hit, None);
             id
         };
@@ -369,12 +371,12 @@ mod tests {
     fn what_a_station_without_supply_had_planned_never_comes() {
         let mut bus = line();
         let (running, _) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
-        bus.add_listeners(running, 1);
+        bus.expect_listeners(running, 1);
         bus.silence(0, ns(50));
         assert_eq!(bus.flight(running).frame.octets(), token().octets(), "under way, it is finished");
         bus.heard(running);
         let (planned, _) = bus.send(0, (ns(500), ns(600)), &token(), Mark::OWN);
-        bus.add_listeners(planned, 1);
+        bus.expect_listeners(planned, 1);
         bus.silence(1, ns(300));
         assert!(!bus.flight(planned).frame.is_empty(), "another station's supply");
         bus.silence(0, ns(300));
@@ -422,7 +424,7 @@ mod tests {
             let tick = Span::from_ticks(1);
             let seen = [start + behind - tick, start + behind, bus.arrival(id, far).0 - tick, bus.arrival(id, far).0];
             assert_eq!(seen.map(|now| bus.is_busy(now, far)), [false, true, true, false]);
-            bus.add_listeners(id, 1);
+            bus.expect_listeners(id, 1);
             bus.heard(id);
             strays.push(stray);
         }

@@ -79,19 +79,52 @@ impl Crystal {
     }
 
     /// What the crystal shows at `time`: the exact value rounded down.
+    #[inline]
     pub fn to_local(&self, time: Time) -> Local {
-        self.after(self.elapsed(time) >> FRACTION)
+        // Of two numbers of 64 bits the product is exact in 128, and almost every reading needs no more.
+        let exact = time.ticks().checked_sub(self.since.ticks()).map(|span| wide(span, self.rate));
+        let ticks = exact.and_then(|exact| i64::try_from((exact + i128::from(self.fraction)) >> FRACTION).ok());
+        match ticks.and_then(|ticks| self.reading.ticks().checked_add(ticks)) {
+            Some(reading) => Local::from_ticks(reading),
+            None => self.far_to_local(time),
+        }
     }
 
     /// The first instant at which the crystal shows `local` or more, so that a deadline never comes early.
     ///
     /// `to_local(to_true(l)) >= l` and `to_local(to_true(l) - 1 tick) < l` unless the result saturates.
+    #[inline]
     pub fn to_true(&self, local: Local) -> Time {
+        // So near that the search needs no more than 64 bits for a span and 128 for a product.
+        const NEAR: i64 = 1 << 61;
+        let ticks = local.ticks().checked_sub(self.reading.ticks()).filter(|ticks| (-NEAR..NEAR).contains(ticks));
+        let Some(ticks) = ticks else { return self.far_to_true(local) };
+        let goal = (i128::from(ticks) << FRACTION) - i128::from(self.fraction);
+        // The inverse is less than 2^-62 too small and the fraction is below one tick, so the estimate is off by one
+        // or two ticks; the loops make it exact.
+        let mut span = (wide(ticks, self.inverse) >> FRACTION) as i64;
+        let mut missing = goal - wide(span, self.rate);
+        while missing > 0 {
+            (span, missing) = (span + 1, missing - i128::from(self.rate));
+        }
+        while missing + i128::from(self.rate) <= 0 {
+            (span, missing) = (span - 1, missing + i128::from(self.rate));
+        }
+        self.since.ticks().checked_add(span).map_or_else(|| self.far_to_true(local), Time::from_ticks)
+    }
+
+    /// [`to_local`](Self::to_local) wherever in the range.
+    #[cold]
+    fn far_to_local(&self, time: Time) -> Local {
+        self.after(self.elapsed(time) >> FRACTION)
+    }
+    /// [`to_true`](Self::to_true) wherever in the range.
+    #[cold]
+    fn far_to_true(&self, local: Local) -> Time {
         let ticks = i128::from(local.ticks()) - i128::from(self.reading.ticks());
         let goal = (ticks << FRACTION) - i128::from(self.fraction);
         let rate = i128::from(self.rate);
-        // The inverse is less than 2^-62 too small and the fraction is below one tick, so the estimate is off by one
-        // or two ticks, by four at the end of the range; the loops make it exact.
+        // Off by four ticks at the end of the range.
         let mut span = (ticks * i128::from(self.inverse)) >> FRACTION;
         while span * rate < goal {
             span += 1;
@@ -122,6 +155,12 @@ fn rates(ppb: i64) -> Result<(i64, i64), CrystalError> {
     let rate = ((BILLION + i128::from(ppb)) << FRACTION) + BILLION / 2;
     let rate = rate / BILLION;
     Ok((rate as i64, ((1 << (2 * FRACTION)) / rate) as i64))
+}
+
+/// The product of two numbers, exact.
+#[inline]
+const fn wide(a: i64, b: i64) -> i128 {
+    a as i128 * b as i128
 }
 
 /// The nearest value in the range of 24 years.
@@ -230,6 +269,21 @@ mod tests {
             let crystal = Crystal::new(ppb, Local::from_ticks(start)).unwrap();
             for ticks in [local / 23 * 22, start + near, start - near, start] {
                 check_inverse(&crystal, Local::from_ticks(ticks));
+            }
+        }
+
+        #[test]
+        fn near_and_far_are_converted_alike(
+            ppb in -1_000_000i64..=1_000_000, start in any::<i64>(), fraction in 0..1i64 << FRACTION, since in any::<i64>(),
+            far in any::<i64>(), near in -1_000_000_000_000i64..1_000_000_000_000,
+        ) {
+            let (since, reading) = (Time::from_ticks(since), Local::from_ticks(start));
+            let all = Crystal { since, reading, fraction, ..crystal(ppb) };
+            let long = Crystal { since: Time::from_ticks(near), reading: Local::from_ticks(-near), ..all.clone() };
+            for (crystal, ticks) in [(&all, far), (&all, start.saturating_add(near)), (&long, far), (&long, far >> 3)] {
+                let (time, local) = (Time::from_ticks(ticks), Local::from_ticks(ticks));
+                prop_assert_eq!(crystal.to_local(time), crystal.far_to_local(time));
+                prop_assert_eq!(crystal.to_true(local), crystal.far_to_true(local));
             }
         }
 

@@ -191,6 +191,11 @@ impl Faults {
             }
         }
     }
+    /// Whether there is no disturbance.
+    #[inline]
+    pub const fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
     /// Whether ends of telegrams reach stations early or late.
     pub const fn strays_arrivals(&self) -> bool {
         !self.receivers.is_empty()
@@ -216,10 +221,12 @@ impl Faults {
         std::mem::take(&mut self.turning)
     }
     /// Whether nothing that `station` sends now, in the cycle of this number, reaches the line.
+    #[inline]
     pub fn mutes(&self, station: Address, running: (Time, u64)) -> bool {
         self.apart.iter().any(|apart| apart.mutes(station, running))
     }
     /// Whether `station` hears nothing now, in the cycle of this number.
+    #[inline]
     pub fn deafens(&self, station: Address, running: (Time, u64)) -> bool {
         self.apart.iter().any(|apart| apart.deafens(station, running))
     }

@@ -4,6 +4,7 @@
 //! number on the line, a station's other events are numbered by this station alone. Only the order of numbers matters,
 //! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
+mod alarms;
 mod disturbed;
 mod source;
 mod tune;
@@ -24,6 +25,7 @@ use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::{Address, Frame};
+use alarms::Alarms;
 use disturbed::Held;
 use turn::Turning;
 
@@ -97,7 +99,8 @@ pub enum Until {
     Cycle(u64),
 }
 
-/// A deadline. Only one event of it counts at a time; arming it later than that event costs nothing until it comes.
+/// A deadline that is no alarm. Only one event of it counts at a time; arming it later than that event costs nothing until
+/// it comes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Deadline {
     /// Armed for this reading of the station's crystal, and the true time of it.
@@ -172,6 +175,7 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     neighbours: Vec<Vec<u8>>,
     bus: Bus,
     queue: Q,
+    alarms: Alarms,
     jitter: JitterSource,
     faults: Faults,
     held: Held,
@@ -236,6 +240,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let turning = faults.take_turning();
         let mut network = Self {
             rate,
+            alarms: Alarms::new(slots.len()),
             slots,
             by_address,
             curious: Vec::new(),
@@ -299,7 +304,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         for _ in 0..budget {
             let over = match until {
                 Until::Cycle(cycle) => self.clocks > cycle,
-                Until::Time(end) => self.queue.peek().is_none_or(|key| key.time() > end),
+                Until::Time(end) => !self.goes_on_until(end),
             };
             if over || !self.next(recorder) {
                 if let Until::Time(end) = until {
@@ -311,9 +316,29 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         false
     }
 
+    /// Whether anything comes until `end`.
+    fn goes_on_until(&mut self, end: Time) -> bool {
+        if self.queue.peek().is_some_and(|key| key.time() <= end) {
+            return true;
+        }
+        self.look_at_alarms(end);
+        self.alarms.next() <= end
+    }
+    fn look_at_alarms(&mut self, limit: Time) {
+        let Self { alarms, slots, now, .. } = self;
+        alarms.look(limit, *now, |slot| &slots[slot].site.crystal);
+    }
+
     /// The next event. False when nothing will ever happen again.
     fn next<R: Recorder>(&mut self, recorder: &mut R) -> bool {
-        let Some((key, NetworkEvent(event))) = self.queue.pop() else { return false };
+        let (key, NetworkEvent(event)) = match self.queue.pop_before(self.alarms.next()) {
+            Some(next) => next,
+            None if self.alarm(recorder) => return true,
+            None => match self.queue.pop() {
+                Some(next) => next,
+                None => return false,
+            },
+        };
         self.now = key.time();
         let slot = usize::from(self.by_address[usize::from(key.station())].expect("events belong to stations"));
         match event {
@@ -331,6 +356,26 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Event::Step(number) => self.step_crystals(number.into()),
             Event::Source(number) => self.emit(number.into(), recorder),
         }
+        true
+    }
+
+    /// The next event if it is an alarm. A station's other deadlines of the instant come before its alarms.
+    #[inline(never)]
+    fn alarm<R: Recorder>(&mut self, recorder: &mut R) -> bool {
+        let head = self.queue.peek();
+        self.look_at_alarms(head.map_or(Time::MAX, Key::time));
+        let at = self.alarms.next();
+        if head.is_some_and(|key| key.time() < at) {
+            return false;
+        }
+        let Some((slot, which, local)) = self.alarms.first(|slot| self.slots[slot].address) else { return false };
+        let key = Key::new(at, Phase::Deadline, self.slots[slot].address.get(), Key::MAX_NUMBER);
+        if head.is_some_and(|head| head < key) {
+            return false;
+        }
+        self.now = at;
+        self.alarms.disarm((slot, which));
+        self.due(slot, which, local, recorder);
         true
     }
 
@@ -369,6 +414,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         for deadline in &mut slot.deadlines {
             deadline.due = None;
         }
+        self.alarms.disarm_all(index);
         if slot.offset.waits {
             self.tune(index);
         }
@@ -385,26 +431,25 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.slots[slot].site.crystal.to_local(self.now)
     }
 
-    fn telegram<R: Recorder>(&mut self, slot: usize, id: FlightId, recorder: &mut R) {
-        let station = &self.slots[slot];
-        let sample = if station.sample_with_telegrams { self.raw(slot) } else { 0 };
-        let now = self.local(slot);
+    fn telegram<R: Recorder>(&mut self, index: usize, id: FlightId, recorder: &mut R) {
+        let sample = if self.slots[index].sample_with_telegrams { self.raw(index) } else { 0 };
+        let running = (self.now, self.clocks_begun(false));
+        let Self { slots, bus, faults, out, .. } = self;
+        let slot = &mut slots[index];
+        let now = slot.site.crystal.to_local(running.0);
+        let flight = bus.flight(id);
         // Without octets it was cut off before it began.
-        if station.powered && !self.bus.flight(id).frame.is_empty() && self.hears(slot, id) {
-            self.out.clear();
-            let flight = self.bus.flight(id);
+        let comes = slot.powered && !flight.frame.is_empty() && bus.reaches(id, index);
+        let hears = comes && !faults.deafens(slot.address, running);
+        if hears {
+            out.clear();
             let octets = if flight.mark.broken { &[] } else { flight.frame.octets() };
-            let input = Input::Telegram(Heard { octets, sample });
-            self.slots[slot].site.machine.step(now, input, &mut self.out);
-            self.bus.heard(id);
-            self.carry_out(slot, now, recorder);
-        } else {
-            self.bus.heard(id);
+            slot.site.machine.step(now, Input::Telegram(Heard { octets, sample }), out);
         }
-    }
-    /// Whether a telegram comes to a station's ears.
-    fn hears(&self, slot: usize, id: FlightId) -> bool {
-        self.bus.reaches(id, slot) && !self.is_deaf(slot)
+        bus.heard(id);
+        if hears {
+            self.carry_out(index, now, recorder);
+        }
     }
     /// Whether a disturbance keeps a station from hearing.
     fn is_deaf(&self, slot: usize) -> bool {
@@ -451,6 +496,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             return self.push(due, Phase::Deadline, slot, Event::Deadline(which as u8));
         }
         deadline.due = None;
+        self.due(slot, which, local, recorder);
+    }
+    /// The deadline of this number that was armed for the reading `local` is due.
+    fn due<R: Recorder>(&mut self, slot: usize, which: usize, local: Local, recorder: &mut R) {
         let input = match Timer::ALL.get(which) {
             Some(&timer) => Input::Deadline { timer, busy: timer == Timer::Slot && self.is_busy(slot) },
             None => Input::Sample(self.raw(slot)),
@@ -472,31 +521,43 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// Does what the station has put into the outbox.
-    fn carry_out<R: Recorder>(&mut self, slot: usize, now: Local, recorder: &mut R) {
-        let station = &mut self.slots[slot];
-        let stamp = Stamp { at: self.now, station: station.address, crystal: &station.site.crystal };
-        for seen in self.out.observations() {
-            recorder.observe(stamp, seen);
+    fn carry_out<R: Recorder>(&mut self, index: usize, now: Local, recorder: &mut R) {
+        let Self { out, slots, alarms, queue, now: instant, .. } = self;
+        let slot = &mut slots[index];
+        for seen in out.observations() {
+            recorder.observe(Stamp { at: *instant, station: slot.address, crystal: &slot.site.crystal }, seen);
         }
-        if let Some(on) = self.out.sampling_with_telegrams() {
-            station.sample_with_telegrams = on;
-        }
-        let filter = station.site.machine.filter();
-        if filter != station.filter {
-            station.filter = filter;
-            self.sort_listeners();
-        }
-        for (which, order) in self.out.orders() {
-            match order {
-                Order::Off => self.slots[slot].deadlines[which].due = None,
-                Order::At(at) => Self::arm(&mut self.queue, &mut self.slots[slot], which, at.max(now), self.now),
+        for (which, order) in out.orders() {
+            match (Alarms::has(which), order) {
+                (true, Order::At(at)) => alarms.arm((index, which), at.max(now), &slot.site.crystal, *instant),
+                (true, Order::Off) => alarms.disarm((index, which)),
+                (false, Order::At(at)) => Self::arm(queue, slot, which, at.max(now), *instant),
+                (false, Order::Off) => slot.deadlines[which].due = None,
             }
         }
-        if let Some(at) = self.out.beginning_cycle() {
-            let at = self.slots[slot].site.crystal.to_true(at).max(self.now);
-            self.begin_cycle(slot, at);
+        debug_assert!(out.has_filter_changed() || slot.filter == slot.site.machine.filter());
+        if out.is_unusual() {
+            self.carry_out_unusual(index);
         }
-        self.transmit(slot, recorder);
+        self.transmit(index, recorder);
+    }
+    /// Does what the station seldom wants.
+    #[cold]
+    fn carry_out_unusual(&mut self, index: usize) {
+        let slot = &mut self.slots[index];
+        if let Some(on) = self.out.sampling_with_telegrams() {
+            slot.sample_with_telegrams = on;
+        }
+        if let Some(at) = self.out.beginning_cycle() {
+            let at = slot.site.crystal.to_true(at).max(self.now);
+            self.begin_cycle(index, at);
+        }
+        let slot = &mut self.slots[index];
+        let filter = slot.site.machine.filter();
+        if filter != slot.filter {
+            slot.filter = filter;
+            self.sort_listeners();
+        }
     }
 
     /// The station's cycle begins at `at`.
@@ -522,34 +583,22 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// Puts the telegram in the outbox, if there is one, onto the line.
-    fn transmit<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
+    fn transmit<R: Recorder>(&mut self, index: usize, recorder: &mut R) {
         let Some((send, frame)) = self.out.sending() else { return };
-        let &Slot { ref site, address, .. } = &self.slots[slot];
-        let mut start = site.crystal.to_true(send.at);
-        let mut end = site.crystal.to_true(send.at + self.rate.octets(frame.len()));
+        let crystal = &self.slots[index].site.crystal;
+        let mut line = (crystal.to_true(send.at), crystal.to_true(send.at + self.rate.octets(frame.len())));
         if send.clock {
-            let jitter = self.jitter.draw(start, self.clocks) + self.faults.clock_strays(start, self.clocks);
-            let jitter = jitter.max(self.now - start);
-            start += jitter;
-            end += jitter;
-        } else {
-            let delay = self.faults.answer_delay(address, (start, self.clocks_begun(false)));
-            start += delay;
-            end += delay;
-        }
-        if send.clock {
+            let jitter = self.jitter.draw(line.0, self.clocks) + self.faults.clock_strays(line.0, self.clocks);
+            let jitter = jitter.max(self.now - line.0);
+            line = (line.0 + jitter, line.1 + jitter);
             // The master's transmitter runs, whatever becomes of the telegram.
-            self.begin_cycle(slot, end);
+            self.begin_cycle(index, line.1);
         }
-        if !self.faults.line.is_idle() {
-            return self.transmit_disturbed(slot, (start, end), send.clock, recorder);
+        if !self.faults.is_empty() {
+            return self.transmit_disturbed(index, line, send.clock, recorder);
         }
-        if self.faults.mutes(address, (start, self.clocks_begun(send.clock))) {
-            return;
-        }
-        let Some((_, frame)) = self.out.sending() else { return };
-        let flight = self.bus.send(slot, (start, end), frame, Mark::OWN);
-        self.sent_off(slot, flight, recorder);
+        let flight = self.bus.send(index, line, self.out.frame(), Mark::OWN);
+        self.sent_off(index, flight, recorder);
     }
     /// Tells that a telegram is on the line, and its listeners when its end will reach them.
     fn sent_off<R: Recorder>(&mut self, slot: usize, (id, hit): (FlightId, Option<usize>), recorder: &mut R) {
@@ -572,39 +621,36 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         if matches!(route, Some(Route { da: Route::TO_ALL, reply: false, .. })) {
             return self.broadcast(sender, id);
         }
-        let mut heard = false;
-        for index in 0..self.curious.len() {
-            heard |= self.deliver_to(self.curious[index].into(), sender, id, route);
+        let apart = self.bus.flight(id).mark.apart;
+        let mut listeners = 0;
+        for rank in 0..self.curious.len() {
+            let listener = usize::from(self.curious[rank]);
+            if (listener != sender || apart) && self.slots[listener].filter.passes(route) {
+                self.push_telegram(listener, id, Event::Telegram(id));
+                listeners += 1;
+            }
         }
-        let addressed = route.and_then(|route| self.by_address[usize::from(route.da)]);
-        if let Some(listener) = addressed.filter(|slot| !self.curious.contains(slot)) {
-            heard |= self.deliver_to(listener.into(), sender, id, route);
+        let addressed = route.and_then(|route| self.by_address[usize::from(route.da)]).map(usize::from);
+        if let Some(listener) = addressed.filter(|&slot| slot != sender || apart) {
+            let filter = &self.slots[listener].filter;
+            if !filter.is_curious() && filter.passes(route) {
+                self.push_telegram(listener, id, Event::Telegram(id));
+                listeners += 1;
+            }
         }
-        if !heard {
-            self.bus.unheard(id);
-        }
-    }
-    fn deliver_to(&mut self, listener: usize, sender: usize, id: FlightId, route: Option<Route>) -> bool {
-        if listener == sender && !self.bus.flight(id).mark.apart || !self.slots[listener].filter.passes(route) {
-            return false;
-        }
-        self.bus.add_listeners(id, 1);
-        self.push_telegram(listener, id, Event::Telegram(id));
-        true
+        self.bus.expect_listeners(id, listeners);
     }
     /// A request for all passes every filter. Only the nearest neighbour is told now and tells the next one when it has
     /// heard, so that the queue holds one event of the telegram, not one for each station. Where links have jitter, who
     /// is nearest differs from telegram to telegram, and all are told now; so where receivers have.
     fn broadcast(&mut self, sender: usize, id: FlightId) {
-        if self.bus.flight(id).mark.apart {
-            self.bus.add_listeners(id, 1);
+        let (count, apart) = (self.neighbours[sender].len(), self.bus.flight(id).mark.apart);
+        self.bus.expect_listeners(id, count as u16 + u16::from(apart));
+        if apart {
             self.push_telegram(sender, id, Event::Telegram(id));
         }
-        let count = self.neighbours[sender].len();
-        match count {
-            0 if self.bus.flight(id).mark.apart => return,
-            0 => return self.bus.unheard(id),
-            count => self.bus.add_listeners(id, count as u16),
+        if count == 0 {
+            return;
         }
         if self.bus.delays().is_steady() && !self.faults.strays_arrivals() {
             return self.tell_neighbour(id, 0);
@@ -642,8 +688,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     fn sort_listeners(&mut self) {
         self.curious.clear();
-        let curious =
-            |(index, slot): (usize, &Slot<S>)| (slot.filter.all || slot.filter.publishers != 0).then_some(index as u8);
+        let curious = |(index, slot): (usize, &Slot<S>)| slot.filter.is_curious().then_some(index as u8);
         self.curious.extend(self.slots.iter().enumerate().filter_map(curious));
     }
 }

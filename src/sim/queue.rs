@@ -88,6 +88,10 @@ pub trait Queue<E: Copy>: Default {
     /// # Panics
     /// If it is earlier than the one before: somebody pushed an event into the past.
     fn pop(&mut self) -> Option<(Key, E)>;
+    /// The same if it comes before `bound`.
+    fn pop_before(&mut self, bound: Time) -> Option<(Key, E)> {
+        if self.peek().is_some_and(|key| key.time() < bound) { self.pop() } else { None }
+    }
     /// The first event's key.
     fn peek(&mut self) -> Option<Key>;
     /// How many events wait.
@@ -240,8 +244,17 @@ impl<E: Copy> NearQueue<E> {
     /// Steps from the next event before the search halves.
     const STEPS: usize = 8;
 
-    /// Puts an event at its place in the list of today.
+    /// Puts an event at its place in the list of today: nearly always it is the next one.
+    #[inline]
     fn insert(&mut self, key: Key, event: E) {
+        if self.today.last().is_some_and(|&(next, _)| next < key) {
+            self.insert_later(key, event);
+        } else {
+            self.today.push((key, event));
+        }
+    }
+    #[inline(never)]
+    fn insert_later(&mut self, key: Key, event: E) {
         let len = self.today.len();
         let mut place = len;
         while place > 0 && self.today[place - 1].0 < key {
@@ -290,6 +303,7 @@ impl<E: Copy> NearQueue<E> {
 
     /// The list of today is empty: goes on to the next day that has something. Not before the next event is asked for,
     /// because what is pushed until then may come earlier.
+    #[inline(never)]
     fn turn(&mut self) {
         let noted = self.next_noted();
         let later = self.later.peek().map(|waiting| day(waiting.key));
@@ -331,6 +345,15 @@ impl<E: Copy> Queue<E> for NearQueue<E> {
             self.turn();
         }
         let (key, event) = self.today.pop()?;
+        self.watch.pass(key);
+        Some((key, event))
+    }
+    #[inline]
+    fn pop_before(&mut self, bound: Time) -> Option<(Key, E)> {
+        if self.today.is_empty() {
+            self.turn();
+        }
+        let (key, event) = self.today.pop_if(|(key, _)| key.time() < bound)?;
         self.watch.pass(key);
         Some((key, event))
     }
@@ -413,6 +436,12 @@ mod tests {
             list.sort_unstable_by_key(|&(key, _)| key);
             let first = (!list.is_empty()).then(|| list.remove(0));
             assert_eq!(queue.peek(), first.map(|(key, _)| key));
+            if let Some((key, event)) = first {
+                assert_eq!(queue.pop_before(key.time()), None);
+                let after = Time::from_ticks(key.time().ticks() + 1);
+                assert_eq!(queue.pop_before(after), Some((key, event)));
+                queue.push(key, event);
+            }
             assert_eq!(queue.pop(), first);
             assert_eq!((queue.len(), queue.is_empty()), (list.len(), list.is_empty()));
             first.map_or(0, |(key, _)| key.time().ticks())

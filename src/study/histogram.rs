@@ -1,18 +1,15 @@
 //! Histograms: how each measured quantity is distributed over a run, signs kept, in a memory that does not grow.
 //!
-//! A signed quantity is kept in two HdrHistograms of ticks, one of magnitudes below zero and one of values from zero
-//! up, so that three significant digits hold on either side and every value below 2048 ticks (170 ns) is exact. Bounds
+//! A signed quantity is kept in two tallies of ticks, one of magnitudes below zero and one of values from zero up, so that three significant digits hold on either side and every value below 2048 ticks (170 ns) is exact. Bounds
 //! are fixed. A value beyond them is not lost: it is counted as out of range, enters count, mean, smallest and largest
 //! exactly, and a percentile that falls among such values says the smallest or largest.
 
 use super::layout::Layout;
 use super::row::{CycleRow, LinkRow, Sink, SlaveRow};
 use super::statistics::bins::Counted;
+use super::tally::{Step, Tally};
 use crate::time::Span;
 use crate::wire::Address;
-
-/// Significant decimal digits of a recorded value.
-const DIGITS: u8 = 3;
 
 /// The distribution of one quantity of one subject.
 #[derive(Clone, Debug)]
@@ -20,9 +17,9 @@ pub struct Histogram {
     /// Largest magnitude \[ticks\] that is kept with its place.
     limit: u64,
     /// Magnitudes of values below zero \[ticks\]; none for an unsigned quantity.
-    negative: Option<hdrhistogram::Histogram<u64>>,
+    negative: Option<Tally>,
     /// Values from zero up \[ticks\].
-    positive: hdrhistogram::Histogram<u64>,
+    positive: Tally,
     below: u64,
     above: u64,
     min: i64,
@@ -48,11 +45,11 @@ impl Histogram {
     /// If `limit` is below 2 ticks.
     pub fn new(limit: Span, signed: bool) -> Self {
         let limit = u64::try_from(limit.ticks()).expect("a limit is positive");
-        let side = hdrhistogram::Histogram::new_with_bounds(1, limit, DIGITS).expect("a limit is at least 2 ticks");
+        assert!(limit >= 2, "a limit is at least 2 ticks");
         Self {
             limit,
-            negative: signed.then(|| side.clone()),
-            positive: side,
+            negative: signed.then(|| Tally::new(limit)),
+            positive: Tally::new(limit),
             below: 0,
             above: 0,
             min: i64::MAX,
@@ -70,18 +67,16 @@ impl Histogram {
         self.sum += i128::from(ticks);
         let magnitude = ticks.unsigned_abs();
         match (ticks < 0, &mut self.negative) {
-            (false, _) if magnitude <= self.limit => self.positive.saturating_record(magnitude),
+            (false, _) if magnitude <= self.limit => self.positive.record(magnitude),
             (false, _) => self.above += 1,
-            (true, Some(negative)) if magnitude <= self.limit => negative.saturating_record(magnitude),
+            (true, Some(negative)) if magnitude <= self.limit => negative.record(magnitude),
             (true, _) => self.below += 1,
         }
     }
 
     /// Forgets every value. Allocates nothing.
     pub fn reset(&mut self) {
-        for side in self.negative.iter_mut().chain([&mut self.positive]).filter(|side| !side.is_empty()) {
-            side.reset();
-        }
+        self.negative.iter_mut().chain([&mut self.positive]).for_each(Tally::reset);
         (self.below, self.above, self.min, self.max, self.sum) = (0, 0, i64::MAX, i64::MIN, 0);
     }
 
@@ -91,9 +86,9 @@ impl Histogram {
     /// If `other` has other bounds.
     pub fn merge(&mut self, other: &Self) {
         assert!(self.limit == other.limit && self.is_signed() == other.is_signed(), "histograms of different bounds");
-        self.positive.add(&other.positive).expect("the bounds are the same");
+        self.positive.merge(&other.positive);
         if let (Some(mine), Some(theirs)) = (&mut self.negative, &other.negative) {
-            mine.add(theirs).expect("the bounds are the same");
+            mine.merge(theirs);
         }
         self.below += other.below;
         self.above += other.above;
@@ -167,7 +162,7 @@ impl Histogram {
     pub fn bins(&self, bins: usize) -> Vec<Bin> {
         let recorded = self.recorded();
         let (Some(first), Some(last)) = (recorded.first(), recorded.last()) else { return Vec::new() };
-        let resolution = self.positive.equivalent_range(first.0.unsigned_abs().max(last.0.unsigned_abs())) as i64;
+        let resolution = Tally::width(first.0.unsigned_abs().max(last.0.unsigned_abs())) as i64;
         // A recorded value stands in the middle of what the histogram cannot tell apart.
         let (low, high) = (first.0 - resolution / 2, last.0 + resolution / 2);
         let width = ((high - low) / bins.max(1) as i64 + 1).max(resolution);
@@ -186,23 +181,23 @@ impl Histogram {
     }
 
     /// Magnitudes of the values below zero \[ticks\], for export; none if the quantity is unsigned.
-    pub fn negative(&self) -> Option<&hdrhistogram::Histogram<u64>> {
-        self.negative.as_ref()
+    pub fn negative(&self) -> Option<hdrhistogram::Histogram<u64>> {
+        self.negative.as_ref().map(|side| side.hdr(self.limit))
     }
     /// Values from zero up \[ticks\], for export.
-    pub fn positive(&self) -> &hdrhistogram::Histogram<u64> {
-        &self.positive
+    pub fn positive(&self) -> hdrhistogram::Histogram<u64> {
+        self.positive.hdr(self.limit)
     }
 
     /// Everything in bins, ascending: what cannot be told apart is one, and so is what is out of range on either side.
     pub(in crate::study) fn counted(&self) -> Vec<Counted> {
         let limit = self.limit as i64;
-        let side = |side: &hdrhistogram::Histogram<u64>, sign: i64| {
-            let bin = |value: u64, count| {
-                let ends = [side.lowest_equivalent(value), side.highest_equivalent(value)].map(|end| sign * end as i64);
-                (ends[0].min(ends[1]), ends[0].max(ends[1]), count)
+        let side = |side: &Tally, sign: i64| {
+            let bin = |step: Step| {
+                let ends = [step.low, step.high()].map(|end| sign * end as i64);
+                (ends[0].min(ends[1]), ends[0].max(ends[1]), step.count)
             };
-            side.iter_recorded().map(|step| bin(step.value_iterated_to(), step.count_at_value())).collect::<Vec<_>>()
+            side.steps().map(bin).collect::<Vec<_>>()
         };
         let mut all = self.negative.as_ref().map_or_else(Vec::new, |negative| side(negative, -1));
         all.push((self.min, if self.is_signed() { -limit - 1 } else { -1 }, self.below));
@@ -215,19 +210,12 @@ impl Histogram {
     }
     /// What is in range, ascending, as (middle of what cannot be told apart \[ticks\], count).
     fn recorded(&self) -> Vec<(i64, u64)> {
-        let side = |side: &hdrhistogram::Histogram<u64>, sign: i64| {
-            let place = |value| sign * side.median_equivalent(value) as i64;
-            side.iter_recorded()
-                .map(|step| (place(step.value_iterated_to()), step.count_at_value()))
-                .collect::<Vec<_>>()
-        };
-        let mut all = self.negative.as_ref().map_or_else(Vec::new, |negative| side(negative, -1));
-        all.reverse();
-        all.extend(side(&self.positive, 1));
-        all
+        let place = |sign: i64| move |step: Step| (sign * step.middle() as i64, step.count);
+        let below = self.negative.iter().flat_map(Tally::steps).rev().map(place(-1));
+        below.chain(self.positive.steps().map(place(1))).collect()
     }
     fn negative_count(&self) -> u64 {
-        self.negative.as_ref().map_or(0, hdrhistogram::Histogram::len)
+        self.negative.as_ref().map_or(0, Tally::len)
     }
     fn rank(&self, percent: f64) -> Option<u64> {
         let thousandths = (percent.clamp(0.0, 100.0) * 1_000.0).round() as u128;
@@ -390,8 +378,9 @@ impl Histograms {
     pub fn new(layout: &Layout) -> Self {
         let mut new = Self { layout: layout.clone(), network: Vec::new(), slave: Vec::new(), link: Vec::new() };
         for quantity in QUANTITIES {
-            let empty = Histogram::new(quantity.limit, quantity.signed);
-            let (name, subjects) = (quantity.name, vec![empty; quantity.subjects(layout).len()]);
+            let empty = |_| Histogram::new(quantity.limit, quantity.signed);
+            let (name, subjects) =
+                (quantity.name, quantity.subjects(layout).into_iter().map(empty).collect::<Vec<_>>());
             match quantity.source {
                 // Without its subject nothing is kept and no row is asked.
                 Source::Ring(_) if subjects.is_empty() => {}

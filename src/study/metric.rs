@@ -222,10 +222,16 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
             self.counts.links[link].observe(stamp.at, what);
         }
         match *what {
-            Observation::Latch { locked: true, .. } => self.latch(index, stamp.at),
             Observation::Subscribed { publisher } => self.subscribed(publisher, stamp),
             Observation::Used { publisher, .. } => self.used(publisher, stamp),
             _ => {}
+        }
+        self.slaves[index].observe(what);
+    }
+    /// The same, as far as rows go.
+    fn routine(&mut self, index: usize, stamp: &Stamp<'_>, what: &Observation) {
+        if let Observation::Latch { locked: true, .. } = what {
+            self.latch(index, stamp.at);
         }
         self.slaves[index].observe(what);
     }
@@ -277,16 +283,30 @@ impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
         if self.held.first().is_some_and(|event| event.at < stamp.at) {
             self.release();
         }
+        let slave = self.layout.slave(stamp.station);
+        if let (Some(index), true) = (slave, is_routine(what)) {
+            return self.routine(index, &stamp, what);
+        }
         self.counts.station(stamp.at, stamp.station, what);
         if stamp.station == self.layout.master {
             self.master(&stamp, what);
-        } else if let Some(index) = self.layout.slave(stamp.station) {
+        } else if let Some(index) = slave {
             self.slave(index, &stamp, what);
         }
         if what.is_event() {
             self.held.push(EventRow { at: stamp.at, cycle: 0, station: stamp.station, what: *what });
         }
     }
+}
+
+/// Whether this is what a slave observes in every cycle in which all is well: it is in the rows and in no count.
+const fn is_routine(what: &Observation) -> bool {
+    matches!(
+        what,
+        Observation::Clock { verdict: ClockVerdict::Hit, .. }
+            | Observation::SetPoint { expected: true, .. }
+            | Observation::Latch { .. }
+    )
 }
 
 /// Largest minus smallest latch offset over the locked encoders, as time and in counts (Model: D9).
@@ -459,6 +479,23 @@ mod tests {
         fn over(self, ns: i64) -> (Counts, Kept) {
             self.metrics.finish(at(ns))
         }
+    }
+
+    #[test]
+    fn what_slaves_observe_when_all_is_well_is_in_no_count() {
+        let mut counts = Counts::new(&sample::layout());
+        let before = counts.clone();
+        let (period, inputs) = (Span::from_ms(1), Inputs { zsw2: 1, g1_zsw: 2, xist1: 3, xist2: 4 });
+        let clock = |verdict| Observation::Clock { verdict, error: Span::ZERO, period, window: period, counter: 3 };
+        let set_point = |expected| Observation::SetPoint { mls: 1, sls: 2, counter: 3, expected };
+        let latch = |locked| Observation::Latch { locked, inputs };
+        for what in [clock(ClockVerdict::Hit), set_point(true), latch(true), latch(false)] {
+            assert!(is_routine(&what) && !what.is_event());
+            counts.station(at(7), address(3), &what);
+            counts.slaves[0].observe(at(7), 9, &what);
+        }
+        assert_eq!(counts, before);
+        assert!(!is_routine(&clock(ClockVerdict::Outside)) && !is_routine(&set_point(false)));
     }
 
     #[test]

@@ -37,6 +37,7 @@ pub mod scenario;
 pub mod statistics;
 pub mod summary;
 pub mod sweep;
+mod tally;
 pub mod tolerance;
 pub mod topology;
 pub mod trace;

@@ -53,7 +53,12 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         clock: bool,
         recorder: &mut R,
     ) {
+        let delay = if clock { Span::ZERO } else { self.answer_delay(slot, start) };
+        let (start, end) = (start + delay, end + delay);
         let cycle = self.clocks_begun(clock);
+        if self.faults.line.is_idle() {
+            return self.transmit_whole(slot, (start, end), cycle, recorder);
+        }
         let Some((_, frame)) = self.out.sending() else { return };
         let sent = Sent { sender: self.slots[slot].address, clock, octets: frame.octets() };
         self.faults.line.judge((start, cycle), &sent);
@@ -83,6 +88,18 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         let flight = self.bus.send(slot, (start, end), frame, Mark { broken, ..Mark::OWN });
         self.sent_off(slot, flight, recorder);
+    }
+    /// How much later than usual a station answers.
+    fn answer_delay(&mut self, slot: usize, start: Time) -> Span {
+        let running = (start, self.clocks_begun(false));
+        self.faults.answer_delay(self.slots[slot].address, running)
+    }
+    /// Puts the telegram in the outbox onto the line as it is, unless something keeps its sender from it.
+    fn transmit_whole<R: Recorder>(&mut self, slot: usize, line: (Time, Time), cycle: u64, recorder: &mut R) {
+        if !self.faults.mutes(self.slots[slot].address, (line.0, cycle)) {
+            let flight = self.bus.send(slot, line, self.out.frame(), Mark::OWN);
+            self.sent_off(slot, flight, recorder);
+        }
     }
     /// Keeps the copies of a telegram of this length that ends at `end`, as its sender has sent it.
     fn copy_telegrams(&mut self, slot: usize, (end, length): (Time, Span)) {

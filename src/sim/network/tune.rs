@@ -76,6 +76,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             .crystal
             .set_rate(self.now, within(slot.offset.own + slot.offset.pulled))
             .expect("a rate within bounds");
+        self.alarms.retune(index, &slot.site.crystal, self.now);
         for which in 0..Outbox::DEADLINES {
             if let Some((local, _)) = self.slots[index].deadlines[which].due {
                 Self::arm(&mut self.queue, &mut self.slots[index], which, local, self.now);

@@ -105,10 +105,10 @@ fn write_subject(log: &mut Log<'_>, subject: Subject, histogram: &Histogram, dur
         })
     };
     match histogram.negative() {
-        None => interval(&subject.to_string(), histogram.positive()),
+        None => interval(&subject.to_string(), &histogram.positive()),
         Some(negative) => {
-            interval(&format!("{subject}.neg"), negative)?;
-            interval(&format!("{subject}.pos"), histogram.positive())
+            interval(&format!("{subject}.neg"), &negative)?;
+            interval(&format!("{subject}.pos"), &histogram.positive())
         }
     }
 }

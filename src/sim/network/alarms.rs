@@ -1,0 +1,217 @@
+//! Alarms: deadlines that a station puts off again and again, so that they seldom come.
+//!
+//! The slot time, the watchdog and the window of the clock are armed anew by whatever shows that all is well. As events in
+//! the queue, each of them would come at its old instant and find that it has moved on. So they wait here instead. An
+//! alarm that is put off keeps the reading at which it was looked at last: it cannot come before the instant of that
+//! reading, and the earliest of these instants is all that the network compares with its next event.
+
+use crate::fdl::{Outbox, Timer};
+use crate::sim::crystal::Crystal;
+use crate::time::{Local, Time};
+
+/// Alarms of a station.
+const KINDS: usize = Timer::ALL.len();
+
+/// One alarm of one station.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Alarm {
+    /// Armed for this reading of the station's crystal; for the end of all readings where it is not armed.
+    due: Local,
+    /// A reading and the true time of it: armed for this reading or a later one, it does not come before.
+    seen: (Local, Time),
+}
+
+impl Alarm {
+    const OFF: Self = Self { due: Local::MAX, seen: Self::UNSEEN };
+    const UNSEEN: (Local, Time) = (Local::MAX, Time::MAX);
+
+    /// Finds out when it comes, not before `now`.
+    fn look(&mut self, crystal: &Crystal, now: Time) -> Time {
+        if self.due == Local::MAX {
+            self.seen = Self::UNSEEN;
+        } else if self.due != self.seen.0 {
+            self.seen = (self.due, crystal.to_true(self.due).max(now));
+        }
+        self.seen.1
+    }
+}
+
+/// The alarms of all stations.
+#[derive(Clone, Debug)]
+pub(super) struct Alarms {
+    /// By the station's slot, then by number.
+    all: Vec<[Alarm; KINDS]>,
+    /// For each number the slots that have ever armed theirs.
+    users: [Vec<u8>; KINDS],
+    /// For each number an instant before which none of it comes, and the earliest of these.
+    nexts: [Time; KINDS],
+    next: Time,
+}
+
+impl Alarms {
+    /// Whether the deadline of this number is an alarm: every timer but those that are there to come.
+    pub(super) const fn has(which: usize) -> bool {
+        const TIMERS: u32 = (1 << KINDS) - 1;
+        const ALARMS: u32 = TIMERS & !(1 << Timer::Schedule as u32 | 1 << Timer::SetPoint as u32);
+        ALARMS >> which & 1 == 1
+    }
+
+    /// The alarms of so many stations, none of them armed.
+    pub(super) fn new(stations: usize) -> Self {
+        Self {
+            all: vec![[Alarm::OFF; KINDS]; stations],
+            users: core::array::from_fn(|_| Vec::with_capacity(stations)),
+            nexts: [Time::MAX; KINDS],
+            next: Time::MAX,
+        }
+    }
+    /// None comes before.
+    pub(super) const fn next(&self) -> Time {
+        self.next
+    }
+    /// Arms the one of this number for the reading `at`, whatever it was.
+    #[inline]
+    pub(super) fn arm(&mut self, (slot, which): (usize, usize), at: Local, crystal: &Crystal, now: Time) {
+        let alarm = &mut self.all[slot][which];
+        alarm.due = at;
+        if at < alarm.seen.0 {
+            self.bring_forward((slot, which), crystal, now);
+        }
+    }
+    /// It is armed for an earlier reading than it was looked at for.
+    fn bring_forward(&mut self, (slot, which): (usize, usize), crystal: &Crystal, now: Time) {
+        let alarm = &mut self.all[slot][which];
+        if alarm.seen == Alarm::UNSEEN && !self.users[which].contains(&(slot as u8)) {
+            self.users[which].push(slot as u8);
+        }
+        let comes = alarm.look(crystal, now);
+        self.nexts[which] = self.nexts[which].min(comes);
+        self.next = self.next.min(comes);
+    }
+    /// Disarms the one of this number.
+    #[inline]
+    pub(super) fn disarm(&mut self, (slot, which): (usize, usize)) {
+        self.all[slot][which].due = Local::MAX;
+    }
+    /// Disarms all of a station.
+    pub(super) fn disarm_all(&mut self, slot: usize) {
+        self.all[slot].iter_mut().for_each(|alarm| alarm.due = Local::MAX);
+    }
+    /// The station's `crystal` has another rate from `now` on.
+    pub(super) fn retune(&mut self, slot: usize, crystal: &Crystal, now: Time) {
+        for (alarm, next) in self.all[slot].iter_mut().zip(&mut self.nexts) {
+            alarm.seen = Alarm::UNSEEN;
+            *next = alarm.look(crystal, now).min(*next);
+            self.next = self.next.min(*next);
+        }
+    }
+
+    /// Looks at all that may come by `limit`. If [`next`](Self::next) is not later than that now, one comes then.
+    pub(super) fn look<'a>(&mut self, limit: Time, now: Time, crystal: impl Fn(usize) -> &'a Crystal) {
+        self.next = Time::MAX;
+        for (which, next) in self.nexts.iter_mut().enumerate() {
+            if *next <= limit {
+                *next = self.users[which].iter().fold(Time::MAX, |next, &slot| {
+                    let slot = usize::from(slot);
+                    self.all[slot][which].look(crystal(slot), now).min(next)
+                });
+            }
+            self.next = self.next.min(*next);
+        }
+    }
+    /// Which one comes first: slot, number and reading. Of several at one instant the one with the least `rank`, then the
+    /// one with the least number.
+    pub(super) fn first<K: Ord>(&self, rank: impl Fn(usize) -> K) -> Option<(usize, usize, Local)> {
+        let coming = (0..KINDS).filter(|&which| self.nexts[which] == self.next);
+        let armed = coming.flat_map(|which| self.users[which].iter().map(move |&slot| (usize::from(slot), which)));
+        let armed = armed.filter_map(|(slot, which)| {
+            let Alarm { due, seen } = self.all[slot][which];
+            (due != Local::MAX && seen.1 == self.next).then_some((slot, which, due))
+        });
+        armed.min_by_key(|&(slot, which, _)| (rank(slot), which))
+    }
+}
+
+const _: () = assert!(Outbox::DEADLINES == KINDS + 1, "the asked sample is no timer");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Span;
+
+    const SLOT_TIME: usize = Timer::Slot as usize;
+    const WINDOW: usize = Timer::Window as usize;
+
+    fn reading(us: i64) -> Local {
+        Local::ZERO + Span::from_us(us)
+    }
+    fn instant(us: i64) -> Time {
+        Time::ZERO + Span::from_us(us)
+    }
+    /// Alarms of three stations whose crystals run true, and those crystals.
+    fn three() -> (Alarms, [Crystal; 3]) {
+        (Alarms::new(3), core::array::from_fn(|_| Crystal::new(0, Local::ZERO).unwrap()))
+    }
+    /// What comes by `limit`, if anything does; higher slots first.
+    fn first(alarms: &mut Alarms, crystals: &[Crystal], limit: Time) -> Option<(usize, usize, Local)> {
+        alarms.look(limit, Time::ZERO, |slot| &crystals[slot]);
+        if alarms.next() > limit { None } else { alarms.first(|slot| usize::MAX - slot) }
+    }
+
+    #[test]
+    fn what_is_put_off_or_disarmed_does_not_come() {
+        let (mut alarms, crystals) = three();
+        for (slot, us) in [(0, 50), (1, 40), (2, 60)] {
+            alarms.arm((slot, WINDOW), reading(us), &crystals[slot], Time::ZERO);
+        }
+        assert_eq!(alarms.next(), instant(40));
+        alarms.arm((1, WINDOW), reading(140), &crystals[1], Time::ZERO);
+        alarms.disarm((0, WINDOW));
+        assert_eq!(alarms.next(), instant(40), "nobody has looked yet");
+        assert_eq!(first(&mut alarms, &crystals, instant(59)), None);
+        assert_eq!(first(&mut alarms, &crystals, instant(60)), Some((2, WINDOW, reading(60))));
+        alarms.disarm_all(2);
+        assert_eq!(first(&mut alarms, &crystals, Time::MAX), Some((1, WINDOW, reading(140))));
+        alarms.disarm_all(1);
+        assert_eq!((first(&mut alarms, &crystals, instant(1_000)), alarms.next()), (None, Time::MAX));
+    }
+
+    #[test]
+    fn what_is_armed_for_earlier_comes_earlier_also_after_it_was_off() {
+        let (mut alarms, crystals) = three();
+        alarms.arm((0, SLOT_TIME), reading(100), &crystals[0], Time::ZERO);
+        alarms.arm((0, SLOT_TIME), reading(70), &crystals[0], Time::ZERO);
+        assert_eq!(alarms.next(), instant(70));
+        alarms.disarm((0, SLOT_TIME));
+        assert_eq!(first(&mut alarms, &crystals, instant(90)), None);
+        alarms.arm((0, SLOT_TIME), reading(80), &crystals[0], Time::ZERO);
+        assert_eq!(first(&mut alarms, &crystals, instant(90)), Some((0, SLOT_TIME, reading(80))));
+    }
+
+    #[test]
+    fn at_one_instant_the_rank_decides_and_then_the_number() {
+        let (mut alarms, crystals) = three();
+        for (slot, which) in [(0, SLOT_TIME), (1, WINDOW), (2, WINDOW), (2, SLOT_TIME)] {
+            alarms.arm((slot, which), reading(10), &crystals[slot], Time::ZERO);
+        }
+        for expected in [(2, SLOT_TIME), (2, WINDOW), (1, WINDOW), (0, SLOT_TIME)] {
+            let (slot, which, due) = first(&mut alarms, &crystals, instant(10)).unwrap();
+            assert_eq!((slot, which, due), (expected.0, expected.1, reading(10)));
+            alarms.disarm((slot, which));
+        }
+    }
+
+    #[test]
+    fn a_new_rate_moves_an_alarm() {
+        let (mut alarms, mut crystals) = three();
+        alarms.arm((1, WINDOW), reading(1_000_000), &crystals[1], Time::ZERO);
+        crystals[1].set_rate(Time::ZERO, 1_000).unwrap();
+        alarms.retune(1, &crystals[1], Time::ZERO);
+        assert_eq!(alarms.next(), crystals[1].to_true(reading(1_000_000)));
+        assert!(alarms.next() < instant(1_000_000), "faster");
+        // Whatever is armed from here on is compared with the new rate.
+        alarms.arm((1, WINDOW), reading(1_000_001), &crystals[1], Time::ZERO);
+        let expected = Some((1, WINDOW, reading(1_000_001)));
+        assert_eq!(first(&mut alarms, &crystals, crystals[1].to_true(reading(1_000_001))), expected);
+    }
+}
