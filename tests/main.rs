@@ -31,6 +31,7 @@ mod replay;
 mod rig;
 mod ring;
 mod scenarios;
+mod shipped_sweeps;
 mod startup;
 mod statistics;
 mod support;

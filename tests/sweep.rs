@@ -40,7 +40,7 @@ fn room() -> Room {
 }
 
 /// Every file below, with what it holds.
-fn files(dir: &Path) -> BTreeMap<PathBuf, String> {
+pub(crate) fn files(dir: &Path) -> BTreeMap<PathBuf, String> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(dir).unwrap_or_else(|error| panic!("{}: {error}", dir.display())) {
         let path = entry.expect("an entry").path();
@@ -56,7 +56,7 @@ fn files(dir: &Path) -> BTreeMap<PathBuf, String> {
 }
 
 /// A CSV file as rows by the names of their columns.
-fn table(path: &Path) -> Vec<BTreeMap<String, String>> {
+pub(crate) fn table(path: &Path) -> Vec<BTreeMap<String, String>> {
     let mut reader = csv::Reader::from_path(path).expect("a table");
     reader.deserialize().collect::<Result<_, _>>().expect("rows")
 }
@@ -518,50 +518,6 @@ fn a_stop_rule_repeats_until_the_mean_is_known() {
     }
     room.runs(&["merge", "merged/jitter", "out/jitter.part-1-of-2", "out/jitter.part-2-of-2"]);
     assert_eq!(files(&room.path("merged")), files(&room.path("four")), "{runs:?}");
-}
-
-/// The summary of a shipped sweep, by its columns.
-fn shipped(name: &str) -> Vec<BTreeMap<String, String>> {
-    let room = Room::new();
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/sweeps/{name}.toml"));
-    room.runs(&["sweep", file.to_str().expect("a path")]);
-    table(&room.path(&format!("out/{name}/summary.csv")))
-}
-
-#[test]
-fn shipped_sweeps_are_all_looked_at() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/sweeps");
-    let mut names: Vec<_> = files(&folder).into_keys().collect();
-    names.sort();
-    assert_eq!(names, ["encoders.toml", "jitter-window.toml"].map(PathBuf::from));
-}
-
-#[test]
-fn a_window_holds_jitter_up_to_a_share_of_its_width() {
-    let rows = shipped("jitter-window");
-    assert_eq!(rows.len(), 20);
-    for row in rows {
-        let of = |column: &str| row[column].parse::<f64>().expect("a number");
-        let share = of("master_gc_jitter_half_width_ns") / (1_000.0 * of("master_t_pll_w_us"));
-        let seen = of("seen_slave_max_clock_failures");
-        assert!((of("broken") - seen * of("runs")).abs() < 1e-9, "{row:?}");
-        if share <= 0.4 {
-            assert!(seen.abs() < f64::EPSILON, "{row:?}");
-        } else if share >= 0.8 {
-            assert!((seen - 1.0).abs() < f64::EPSILON, "{row:?}");
-        }
-    }
-}
-
-#[test]
-fn every_encoder_lengthens_t_dx_by_its_exchange() {
-    let rows = shipped("encoders");
-    let t_dx: Vec<_> = rows.iter().map(|row| row["mean_t_dx_max_us"].parse::<f64>().expect("a number")).collect();
-    for (encoders, t_dx) in [1.0, 2.0, 4.0, 8.0].into_iter().zip(t_dx) {
-        assert!((t_dx - (105.17 + 40.5 * encoders)).abs() < 0.05, "{encoders} encoders: {t_dx} us");
-    }
-    let spare = rows[3]["min_spare_min_us"].parse::<f64>().expect("a number");
-    assert!((spare - 1_376.0).abs() < 1.0, "{spare} us");
 }
 
 /// What a part of the shipped scenarios comes to under this version of the model.
