@@ -34,6 +34,7 @@ mod scenarios;
 mod shipped_sweeps;
 mod startup;
 mod statistics;
+mod steady;
 mod support;
 mod swarm;
 mod sweep;

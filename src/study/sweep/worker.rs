@@ -13,7 +13,7 @@ use crate::sim::network::NetworkEvent;
 use crate::sim::queue::NearQueue;
 use crate::study::figure::{Figure, Figures, Value};
 use crate::study::histogram::Histograms;
-use crate::study::measure::measure;
+use crate::study::measure::measure_of;
 use crate::study::scenario::Scenario;
 use crate::study::verdict::judge;
 
@@ -55,7 +55,7 @@ impl Worker {
         AT_WORK.set(true);
         // What the run has touched is thrown away where it fails.
         let measured = catch_unwind(AssertUnwindSafe(|| {
-            measure::<NearQueue<NetworkEvent>>(scenario, used, |progress| {
+            measure_of::<NearQueue<NetworkEvent>>(&plan.definition.figures, scenario, used, |progress| {
                 cycle = progress.cycles.saturating_sub(1);
                 !stop.load(Ordering::Relaxed)
             })
