@@ -8,6 +8,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use assert_cmd::cargo::cargo_bin;
+use isodp::study::statistics::confidence::Confidence;
+use isodp::study::statistics::student::student_quantile;
 use isodp::study::sweep::key::MODEL_VERSION;
 
 use crate::cli::Room;
@@ -215,8 +217,13 @@ fn lines(octets: &[u8]) -> usize {
 }
 
 /// Starts the sweep and waits until some of its runs are done.
-#[expect(clippy::zombie_processes, reason = "who asked for it waits for it")]
 fn begin(room: &Room) -> Child {
+    begin_and_do(room, 3)
+}
+
+/// The same until so many are.
+#[expect(clippy::zombie_processes, reason = "who asked for it waits for it")]
+fn begin_and_do(room: &Room, runs: usize) -> Child {
     let child = Command::new(cargo_bin!("isodp"))
         .args(["sweep", "jitter.toml", "--threads", "2"])
         .current_dir(room.path("."))
@@ -227,7 +234,7 @@ fn begin(room: &Room) -> Child {
     let end = Instant::now() + Duration::from_secs(120);
     loop {
         let journal = fs::read(room.path("out/jitter/runs/journal.jsonl")).unwrap_or_default();
-        if lines(&journal) >= 3 {
+        if lines(&journal) >= runs {
             return child;
         }
         assert!(Instant::now() < end, "no run is done");
@@ -518,6 +525,56 @@ fn a_stop_rule_repeats_until_the_mean_is_known() {
     }
     room.runs(&["merge", "merged/jitter", "out/jitter.part-1-of-2", "out/jitter.part-2-of-2"]);
     assert_eq!(files(&room.path("merged")), files(&room.path("four")), "{runs:?}");
+}
+
+/// Half widths of the mean of `values` and the mean itself, by Student's t at 95 %.
+fn half_width(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>() / (count - 1.0);
+    (student_quantile(count - 1.0, Confidence::USUAL) * (variance / count).sqrt(), mean)
+}
+
+#[test]
+fn a_stop_rule_goes_on_until_the_mean_is_known_and_not_further_whatever_stops_it() {
+    let room = room();
+    let until = "repetitions = 10\nuntil = { figure = \"slave.4.pll_error.max\", relative_half_width = \"8 %\", \
+                 max_repetitions = 400 }";
+    room.write("jitter.toml", SWEEP.replace("repetitions = 3", until).replace("400 ms", "1 s"));
+    // Into the runs that the rule asks for beyond the first 40.
+    let mut child = begin_and_do(&room, 45);
+    child.kill().expect("it can be killed");
+    child.wait().expect("it ends");
+    let kept = lines(&fs::read(room.path("out/jitter/runs/journal.jsonl")).expect("a journal"));
+    assert!(!room.path("out/jitter/results.csv").exists(), "it was over before it was killed");
+    let page = room.runs(&["sweep", "jitter.toml"]);
+    let rows = table(&room.path("out/jitter/results.csv"));
+    let (total, now) = (rows.len(), rows.len() - kept);
+    assert!(page.contains(&format!("\n{now} runs done now, {kept} before, 0 failed\n")), "{total} runs: {page}");
+    for threads in ["1", "2"] {
+        room.runs(&["sweep", "jitter.toml", "--threads", threads, "--out", threads]);
+        assert_eq!(files(&room.path(threads)), files(&room.path("out")), "{threads} threads");
+    }
+    let mut counts = Vec::new();
+    for combination in rows.chunk_by(|one, other| {
+        ["bus_cable_m", "master_gc_jitter_half_width_ns"].iter().all(|column| one[*column] == other[*column])
+    }) {
+        let values: Vec<f64> = combination.iter().map(|row| row["slave_4_pll_error_max_ns"].parse().unwrap()).collect();
+        // A quarter more each time: all counts that the rule looked at before.
+        let looks = std::iter::successors(Some(10), |count| Some((count + count / 4).min(400)));
+        let looks: Vec<usize> = looks.take_while(|&count| count <= values.len()).take(40).collect();
+        let (last, before) = looks.split_last().expect("ten at least");
+        assert_eq!(*last, values.len(), "{looks:?}");
+        for &count in before {
+            let (half, mean) = half_width(&values[..count]);
+            assert!(half > 0.08 * mean, "{count} of {} were enough", values.len());
+        }
+        let (half, mean) = half_width(&values);
+        assert!(half <= 0.08 * mean, "{half} of {mean} after {} runs", values.len());
+        counts.push(values.len());
+    }
+    assert_eq!(counts.len(), 4);
+    assert!(counts.iter().any(|&count| count > 10) && counts.iter().all(|&count| count < 400), "{counts:?}");
 }
 
 /// What a part of the shipped scenarios comes to under this version of the model.
