@@ -15,6 +15,7 @@ use isodp::study::histogram::Histograms;
 use isodp::study::metric::Metrics;
 use isodp::study::row::{CycleRow, LinkRow, Sink, SlaveRow};
 use isodp::study::run;
+use isodp::study::scenario::disturbance::DISTURBANCES;
 use isodp::study::scenario::{Flight, Scenario};
 use isodp::study::steady::SteadyState;
 
@@ -83,28 +84,72 @@ fn a_fault_and_its_acknowledgement_allocate_nothing() {
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
 }
 
+/// Those of the line, in two-masters.
+const ON_THE_LINE: &[&str] = &[
+    "kind = \"lost-telegrams\"\nrate = \"1 %\"\nservice = \"data-exchange\"",
+    "kind = \"lost-telegrams\"\npattern = \"x...............\"\nservice = \"fdl-status\"",
+    "kind = \"missing-clocks\"\nrate = \"1 %\"",
+    "kind = \"late-telegrams\"\nup_to = \"2 us\"\nservice = \"replies\"",
+    "kind = \"duplicate-telegrams\"\nrate = \"5 %\"\nservice = \"replies\"",
+    "kind = \"bit-errors\"\nrate = \"1e-5\"",
+    "kind = \"wrong-octet\"\noctet = 8\nflip = 3\nrate = \"1 %\"\nto = 4",
+    "kind = \"noise\"\nmean = \"5 ms\"\noctets_to = 4",
+    "kind = \"noise\"\ncycle = 0\nfor = 1\nevery = 30\nafter = \"30 us\"",
+    "kind = \"foreign-telegram\"\nat = \"1 ms\"\nfor = \"1 ms\"\nevery = \"41 ms\"\ndata = { to = 4, from = 9, fc = 0x49 }",
+    "kind = \"late-token\"\nstation = 12\nby = \"20 us\"\ncycle = 1\nfor = 10\nevery = 25",
+    "kind = \"overlong-acyclic\"\nto = 4\noctets = 100\ncycle = 500\nfor = 2\nevery = 25",
+];
+/// Those of stations, crystals and paths, in the reference network: every one begins and ends again and again.
+const OF_STATIONS: &[&str] = &[
+    "kind = \"silent\"\nstation = 3\ncycle = 500\nfor = 1\nevery = 50",
+    "kind = \"deaf\"\nstation = 4\ncycle = 510\nfor = 1\nevery = 50",
+    "kind = \"mute\"\nstation = 4\ncycle = 530\nfor = 1\nevery = 50",
+    "kind = \"crystal-offset\"\nstations = \"2..3\"\noffset = \"5 ppm\"\ncycle = 500\nfor = 20\nevery = 50",
+    "kind = \"crystal-wander\"\nstations = \"all slaves\"\nstep = \"10 ppb\"\ninterval = \"1 ms\"\nbound = \"2 ppm\"",
+    "kind = \"temperature-step\"\nstation = 2\noffset = \"9 ppm\"\ntime_constant = \"1 s\"\ncycle = 500\nfor = 200\nevery = 400",
+    "kind = \"gc-jitter\"\nshape = \"table\"\noffsets = [\"10 ns\", \"-10 ns\"]",
+    "kind = \"receiver-jitter\"\nstation = 6\nhalf_width = \"20 ns\"\ncycle = 500\nfor = 9\nevery = 50",
+    "kind = \"t-sdr-jitter\"\nstation = 7\nup_to = \"9 tbit\"",
+    "kind = \"cable-cut\"\nposition = \"95 m\"\ncycle = 530\nfor = 1\nevery = 50",
+    "kind = \"hold-life-sign\"\nstation = 5\ncycle = 520\nfor = 1\nevery = 50",
+    "kind = \"jump-life-sign\"\nstation = 9\nto = 9\ncycle = 540\nfor = 1\nevery = 100",
+    "kind = \"repeat-life-sign\"\nstation = 10\ncycle = 540\nfor = 1\nevery = 50",
+];
+/// Those after which a slave starts anew, in the reference network, and how often it does in the watched cycles.
+const OF_STARTS: &[(&str, u64)] = &[
+    ("kind = \"restart\"\nstation = 8\ncycle = 505\nfor = 60\nevery = 350", 3),
+    ("kind = \"wrong-parameters\"\nstation = 7\noctets = [[5, 0x12]]\ncycle = 515\nfor = 60\nevery = 350", 6),
+];
+/// Those of repeaters, in a network that has some.
+const OF_REPEATERS: &[&str] = &[
+    "kind = \"repeater-jitter\"\nrepeater = \"press - gallery\"\nhalf_width = \"50 ns\"\ncycle = 500\nfor = 9\nevery = 50",
+];
+
+/// A shipped scenario with these disturbances.
+fn disturbed(name: &str, sets: &[(&str, &str)], disturbances: &[&str]) -> Scenario {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{name}.toml"));
+    let mut text = std::fs::read_to_string(path).expect("a scenario");
+    for keys in disturbances {
+        text.extend(["\n[[disturbance]]\n", keys, "\n"]);
+    }
+    let sets: Vec<_> = sets.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
+    Scenario::parse(name, "disturbed.toml", &text, &sets).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A new kind has to come into one of the lists.
+#[test]
+fn every_kind_of_disturbance_is_in_a_list() {
+    let starts = OF_STARTS.iter().map(|start| start.0);
+    let all: Vec<_> = [ON_THE_LINE, OF_STATIONS, OF_REPEATERS].concat().into_iter().chain(starts).collect();
+    for kind in DISTURBANCES {
+        let begin = format!("kind = \"{}\"\n", kind.name);
+        assert!(all.iter().any(|keys| keys.starts_with(&begin)), "{}", kind.name);
+    }
+}
+
 #[test]
 fn disturbances_of_the_line_allocate_nothing() {
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/two-masters.toml"));
-    let mut text = text.expect("a scenario").replace("cycles = 1000", "cycles = 3000");
-    for keys in [
-        "kind = \"lost-telegrams\"\nrate = \"1 %\"\nservice = \"data-exchange\"",
-        "kind = \"lost-telegrams\"\npattern = \"x...............\"\nservice = \"fdl-status\"",
-        "kind = \"missing-clocks\"\nrate = \"1 %\"",
-        "kind = \"late-telegrams\"\nup_to = \"2 us\"\nservice = \"replies\"",
-        "kind = \"duplicate-telegrams\"\nrate = \"5 %\"\nservice = \"replies\"",
-        "kind = \"bit-errors\"\nrate = \"1e-5\"",
-        "kind = \"wrong-octet\"\noctet = 8\nflip = 3\nrate = \"1 %\"\nto = 4",
-        "kind = \"noise\"\nmean = \"5 ms\"\noctets_to = 4",
-        "kind = \"noise\"\ncycle = 0\nfor = 1\nevery = 30\nafter = \"30 us\"",
-        "kind = \"foreign-telegram\"\nat = \"1 ms\"\nfor = \"1 ms\"\nevery = \"41 ms\"\ndata = { to = 4, from = 9, fc = 0x49 }",
-        "kind = \"late-token\"\nstation = 12\nby = \"20 us\"\ncycle = 1\nfor = 10\nevery = 25",
-        "kind = \"overlong-acyclic\"\nto = 4\noctets = 100\ncycle = 500\nfor = 2\nevery = 25",
-    ] {
-        text += "\n[[disturbance]]\n";
-        text += keys;
-    }
-    let disturbed = Scenario::parse("line", "line.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let disturbed = disturbed("two-masters", &[("run.cycles", "3000")], ON_THE_LINE);
     assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
 }
 
@@ -130,20 +175,22 @@ fn links_in_both_tables_and_a_lost_publisher_allocate_nothing() {
 /// Every kind of a disturbance that begins and ends, several of them again and again.
 #[test]
 fn disturbances_of_stations_allocate_nothing() {
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/reference.toml"));
-    let text = text.expect("a scenario")
-        + "\n[[disturbance]]\nkind = \"silent\"\nstation = 3\ncycle = 500\nfor = 1\nevery = 50\n\
-           [[disturbance]]\nkind = \"deaf\"\nstation = 4\ncycle = 510\nfor = 1\nevery = 50\n\
-           [[disturbance]]\nkind = \"crystal-wander\"\nstations = \"all slaves\"\nstep = \"10 ppb\"\ninterval = \"1 ms\"\nbound = \"2 ppm\"\n\
-           [[disturbance]]\nkind = \"temperature-step\"\nstation = 2\noffset = \"9 ppm\"\ntime_constant = \"1 s\"\ncycle = 500\nfor = 200\nevery = 400\n\
-           [[disturbance]]\nkind = \"gc-jitter\"\nshape = \"table\"\noffsets = [\"10 ns\", \"-10 ns\"]\n\
-           [[disturbance]]\nkind = \"receiver-jitter\"\nstation = 6\nhalf_width = \"20 ns\"\ncycle = 500\nfor = 9\nevery = 50\n\
-           [[disturbance]]\nkind = \"t-sdr-jitter\"\nstation = 7\nup_to = \"9 tbit\"\n\
-           [[disturbance]]\nkind = \"cable-cut\"\nposition = \"95 m\"\ncycle = 530\nfor = 1\nevery = 50\n\
-           [[disturbance]]\nkind = \"hold-life-sign\"\nstation = 5\ncycle = 520\nfor = 1\nevery = 50\n";
-    let disturbed = Scenario::parse("disturbed", "disturbed", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0);
-    assert_eq!(allocations::<HeapQueue<NetworkEvent>>(&disturbed), 0);
+    for disturbed in
+        [disturbed("reference", &[], OF_STATIONS), disturbed("repeaters", &[("run.duration", "10 s")], OF_REPEATERS)]
+    {
+        assert_eq!(allocations::<NearQueue<NetworkEvent>>(&disturbed), 0, "{}", disturbed.name);
+        assert_eq!(allocations::<HeapQueue<NetworkEvent>>(&disturbed), 0, "{}", disturbed.name);
+    }
+}
+
+/// A start-up takes room once; the cycles in which a slave is without supply or out of data exchange do not.
+#[test]
+fn a_slave_that_starts_anew_allocates_for_its_parameters_alone() {
+    for (keys, starts) in OF_STARTS {
+        let disturbed = disturbed("reference", &[], &[keys]);
+        let count = allocations::<NearQueue<NetworkEvent>>(&disturbed);
+        assert!(count <= *starts, "{count} allocations for {starts} starts: {keys}");
+    }
 }
 
 /// Rows as a run of figures takes them.

@@ -506,6 +506,49 @@ fn a_page_that_cannot_be_shown_is_told() {
     assert_eq!((text(&output.stderr), output.status.code()), ("", Some(0)));
 }
 
+/// What a run does not write, an earlier one may have: its files would tell of another run.
+#[test]
+fn all_files_are_of_the_latest_run() {
+    let room = Room::new();
+    let listed = |room: &Room| -> BTreeSet<String> {
+        let summary = fs::read(room.path("out/scene/summary.json")).expect("a summary");
+        let summary: serde_json::Value = serde_json::from_slice(&summary).expect("JSON");
+        let files = summary["files"].as_array().expect("names").iter();
+        files.map(|name| name.as_str().expect("a name").to_owned()).collect()
+    };
+    let cut = "\n[[disturbance]]\nkind = \"missing-clocks\"\ncycle = 60\nfor = 3\n[record.flight]\non = true\n";
+    room.write("scene.toml", SCENE.to_owned() + cut);
+    room.runs(&["run", "scene.toml"]);
+    let all = room.names("out/scene");
+    assert_eq!(all, listed(&room));
+    for name in ["flight.txt", "flight.pcapng", "flight.vcd", "profibus_dp.lua", "disturbances.svg", "publish.hlog"] {
+        assert!(all.contains(name), "{name}: {all:?}");
+    }
+    // The user's own file, what another command has made, and a directory that has a name of ours.
+    room.write("out/scene/notes.txt", "mine");
+    room.write("out/scene/budget.svg", "of isodp budget");
+    room.runs(&["run", "scene.toml", "--set", "record.flight.on=false", "--set", "record.plots=false"]);
+    let foreign = ["notes.txt", "budget.svg"].map(str::to_owned);
+    let expected = |room: &Room| listed(room).into_iter().chain(foreign.clone()).collect::<BTreeSet<_>>();
+    assert_eq!(room.names("out/scene"), expected(&room));
+    assert!(!listed(&room).iter().any(|name| name.starts_with("flight") || name.contains(".svg")));
+    // Neither a link nor a disturbance any more, and no tables.
+    fs::create_dir(room.path("out/scene/flight.txt")).expect("a directory");
+    room.write("scene.toml", SCENE.split("[[link]]").next().expect("a scene"));
+    room.runs(&["run", "scene.toml", "--set", "record.cycles_csv=false", "--set", "record.links_csv=false"]);
+    let mut expected = expected(&room);
+    assert!(
+        !expected.contains("cycles.csv")
+            && !expected.contains("publish.hlog")
+            && !expected.contains("disturbances.svg")
+    );
+    expected.insert("flight.txt".to_owned());
+    assert_eq!(room.names("out/scene"), expected);
+    // A run that writes nothing leaves everything.
+    room.runs(&["run", "scene.toml", "--set", "record.files=false"]);
+    assert_eq!(room.names("out/scene"), expected);
+}
+
 /// Kills a long run after its temporary files are there: none of them has a name of a result.
 #[test]
 #[cfg(unix)]

@@ -3,6 +3,7 @@
 
 mod acyclic;
 mod clock;
+mod each;
 mod gc_jitter;
 mod path;
 mod scenarios;

@@ -7,7 +7,7 @@ mod disturbance;
 mod draw;
 mod scenario;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use isodp::device::node::Node;
@@ -64,6 +64,8 @@ struct Watch {
     begun: u64,
     /// When each class 2 master had its last answer from a slave.
     answered: BTreeMap<Address, Time>,
+    /// Masters that have seen another station use their address. They stay away until their supply is off and on again.
+    conflicts: BTreeSet<Address>,
 }
 
 impl Recorder for Watch {
@@ -77,6 +79,8 @@ impl Recorder for Watch {
             Observation::ClockLate { .. } if self.repeated + self.t_dp > stamp.at => {}
             Observation::ClockLate { by } => self.late = self.late.or(Some((stamp.at, by))),
             Observation::AutoClear { .. } => self.cleared = stamp.at,
+            Observation::AddressConflict => _ = self.conflicts.insert(stamp.station),
+            Observation::Power { on: true } => _ = self.conflicts.remove(&stamp.station),
             Observation::CycleStart { .. } if Some(stamp.station) == self.master => self.begun += 1,
             Observation::Pll { to, .. } => {
                 self.pll.insert(stamp.station, to);
@@ -112,6 +116,8 @@ struct Seen {
     counts: Counts,
     /// A disturbance that hangs on cycles never ends, since no cycle begins any more.
     endless: bool,
+    /// Masters that keep away because another station used their address.
+    conflicts: BTreeSet<Address>,
 }
 
 /// How long everything may take to come back: the GAP finds every station, a free-running master and an isochronous
@@ -121,7 +127,9 @@ fn patience(scenario: &Scenario, case: &Case) -> Span {
     let gap = 3 * i64::from(bus.gap_factor) * i64::from(bus.hsa);
     // A slave keeps a connection that its master lost for two Send_Timeout of 1 s.
     let connections = if case.asking.is_empty() { Span::ZERO } else { Span::from_ms(2_300) };
-    case.cycle * (300 + 20 * scenario.slaves.len() as i64 + gap) + connections
+    // Each service of a start-up may wait for a rotation in which T_TR leaves time for it.
+    let others = scenario.slaves.iter().filter(|slave| slave.master != scenario.master.address).count() as i64;
+    case.cycle * (300 + 20 * scenario.slaves.len() as i64 + 150 * others + gap) + connections
 }
 
 /// Runs until `until`, or until everything has had time to come back.
@@ -159,10 +167,13 @@ fn run_on<Q: Queue<NetworkEvent>>(scenario: &Scenario, case: &Case, until: Optio
     if let Some(&[one, next]) = rows.cycles.windows(2).find(|pair| pair[1] != pair[0] + 1) {
         faults.push(format!("cycle {next} comes after cycle {one}"));
     }
-    if !endless {
+    if case.restarts && !watch.conflicts.is_empty() {
+        faults.push(format!("another station uses the address of {:?}, though all is over", watch.conflicts));
+    }
+    if !endless && watch.conflicts.is_empty() {
         judge(scenario, case, &network, &watch, &mut faults);
     }
-    Seen { end, fingerprint: fingerprints.total(), faults, counts, endless }
+    Seen { end, fingerprint: fingerprints.total(), faults, counts, endless, conflicts: watch.conflicts }
 }
 
 /// What is not as it should be at the end.
@@ -211,24 +222,25 @@ fn judge<Q: Queue<NetworkEvent>>(
     // A message takes a rotation, an answer several of them, and the slaves take turns.
     for &address in &case.asking {
         let last = watch.answered.get(&Address::new(address).expect("an address")).copied();
-        if last.is_none_or(|last| last < network.now() - Span::from_ms(500) - case.cycle * 60) {
+        let patience = Span::from_ms(500) + case.cycle * (60 + 10 * scenario.slaves.len() as i64);
+        if last.is_none_or(|last| last < network.now() - patience) {
             faults.push(format!("class 2 master {address} had its last answer at {last:?}"));
         }
     }
 }
 
-/// Everything about one case that is not as it should be, and whether its disturbances never end.
-fn faults(scenario: &Scenario, case: &Case) -> (bool, Vec<String>) {
+/// Everything about one case that is not as it should be, and the run.
+fn faults(scenario: &Scenario, case: &Case) -> (Seen, Vec<String>) {
     let first = run_on::<NearQueue<NetworkEvent>>(scenario, case, None);
     let again = run_on::<NearQueue<NetworkEvent>>(scenario, case, Some(first.end));
     let other = run_on::<HeapQueue<NetworkEvent>>(scenario, case, Some(first.end));
-    let mut faults = first.faults;
+    let mut faults = first.faults.clone();
     for (run, name) in [(again, "again"), (other, "on the other queue")] {
         if run.fingerprint != first.fingerprint || format!("{:?}", run.counts) != format!("{:?}", first.counts) {
             faults.push(format!("another fingerprint {name}: {} and {}", first.fingerprint, run.fingerprint));
         }
     }
-    (first.endless, faults)
+    (first, faults)
 }
 
 /// The run that a user starts, with all its files.
@@ -254,10 +266,14 @@ enum Tried {
 
 /// Tries the case of this seed.
 fn try_seed(seed: u64) -> Tried {
-    let case = match scenario::case(seed) {
-        Ok(case) => case,
-        Err(why) => return Tried::Refused(format!("seed {seed}: {why}")),
-    };
+    match scenario::case(seed) {
+        Ok(case) => try_case(seed, case),
+        Err(why) => Tried::Refused(format!("seed {seed}: {why}")),
+    }
+}
+
+/// Tries a case; and once more, where masters keep away because their address was used, with those restarted at the end.
+fn try_case(seed: u64, case: Case) -> Tried {
     let scenario = match case.scenario() {
         Ok(scenario) => scenario,
         Err(why) => return Tried::Refused(format!("seed {seed}: {why}")),
@@ -266,17 +282,19 @@ fn try_seed(seed: u64) -> Tried {
         if seed.is_multiple_of(WITH_FILES) {
             with_files(&scenario, &case);
         }
-        faults(&scenario, &case)
+        let (run, faults) = faults(&scenario, &case);
+        (run.endless, run.conflicts, faults)
     }));
-    let (endless, faults) = tried.unwrap_or_else(|panic| {
+    let (endless, conflicts, faults) = tried.unwrap_or_else(|panic| {
         let message = panic.downcast_ref::<String>().cloned();
         let message = message.or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string));
-        (false, vec![format!("panic: {}", message.unwrap_or_default())])
+        (false, BTreeSet::new(), vec![format!("panic: {}", message.unwrap_or_default())])
     });
-    match (endless, faults.is_empty()) {
-        (_, false) => Tried::Wrong(format!("ISODP_SWARM_SEED={seed}\n{}\n{}", faults.join("\n"), case.text)),
-        (true, true) => Tried::Endless,
-        (false, true) => Tried::Well,
+    match (endless, faults.is_empty(), conflicts.is_empty()) {
+        (_, false, _) => Tried::Wrong(format!("ISODP_SWARM_SEED={seed}\n{}\n{}", faults.join("\n"), case.text)),
+        (_, true, false) => try_case(seed, case.with_restarts(&conflicts)),
+        (true, true, true) => Tried::Endless,
+        (false, true, true) => Tried::Well,
     }
 }
 

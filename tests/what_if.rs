@@ -172,6 +172,117 @@ fn a_disturbance_that_comes_later_can_be_another() {
         assert_eq!(ends[0].1.total(), straight.fingerprint, "{set:?}");
     }
 }
+/// The shipped scenario with repeaters for a second, with these disturbances, each the keys of one.
+fn halls(disturbances: &[String]) -> Scenario {
+    let path = format!("{}/scenarios/repeaters.toml", env!("CARGO_MANIFEST_DIR"));
+    let mut text = std::fs::read_to_string(&path).expect("a scenario");
+    for keys in disturbances {
+        text.extend(["\n[[disturbance]]\n", &keys.replace("; ", "\n"), "\n"]);
+    }
+    let sets = [(SHORT.0.to_owned(), SHORT.1.to_owned())];
+    Scenario::parse("repeaters", &path, &text, &sets).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// What repeaters add and where cables are cut can be otherwise too, under the same name or another: the other future is
+/// that of a run with it, and the original's is what it was.
+#[test]
+fn paths_can_be_disturbed_otherwise() {
+    let jitter = |ns: u32, from: u32| {
+        format!(
+            "kind = \"repeater-jitter\"; repeater = \"press - gallery\"; half_width = \"{ns} ns\"; cycle = {from}; for = 50"
+        )
+    };
+    let cut = |metres: u32, from: u32| {
+        format!("kind = \"cable-cut\"; segment = \"press\"; position = \"{metres} m\"; cycle = {from}; for = 30")
+    };
+    let named = |keys: String| format!("name = \"another\"; {keys}");
+    for [before, now] in [
+        [vec![], vec![jitter(100, 310)]],
+        [vec![jitter(100, 310)], vec![]],
+        [vec![jitter(100, 310)], vec![jitter(40, 310)]],
+        [vec![jitter(100, 310)], vec![jitter(100, 310), named(jitter(60, 330))]],
+        [vec![jitter(100, 310)], vec![jitter(100, 340)]],
+        [vec![], vec![cut(40, 310)]],
+        [vec![cut(40, 310)], vec![]],
+        [vec![cut(30, 310)], vec![cut(60, 310)]],
+        [vec![cut(40, 310)], vec![cut(40, 330)]],
+        [vec![cut(40, 310), named(jitter(50, 320))], vec![cut(20, 315), named(cut(60, 330))]],
+    ] {
+        let both = [halls(&before), halls(&now)];
+        let whole = both.each_ref().map(|scenario| run::<Near>(scenario, None, |_| ()).expect("a run").fingerprint);
+        let futures = futures::<Near, _>(both.each_ref(), (300, None), rider(&both[0]), |_| ());
+        let Futures { differences, ends, .. } = futures.unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(ends.each_ref().map(|end| end.1.total()), whole, "{before:?}, {now:?}");
+        // That it begins is told before its first cycle.
+        assert!(differences.first().expect("a difference").cycle() >= Some(309), "{before:?}, {now:?}");
+    }
+}
+
+#[test]
+fn a_cut_that_lasts_is_another_one_from_the_cycle_on() {
+    let cut = |metres: u32| {
+        format!("kind = \"cable-cut\"; segment = \"press\"; position = \"{metres} m\"; cycle = 290; for = 150")
+    };
+    // The slaves of the press sit at 40 and 80 m, those of the gallery behind them.
+    let both = [halls(&[cut(20)]), halls(&[cut(60)])];
+    let Futures { differences, ends, .. } = futures::<Near, _>(both.each_ref(), (300, None), rider(&both[0]), |_| ())
+        .unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(ends[0].1.total(), run::<Near>(&both[0], None, |_| ()).expect("a run").fingerprint);
+    let [before, now] = ends.map(|end| end.1.stations().collect::<Vec<_>>());
+    let differs = |slave| before.iter().zip(&now).any(|(a, b)| a.0 == address(slave) && a.1.wire != b.1.wire);
+    assert!(differs(5) && !differs(3), "slave 5 is heard again: {differences:?}");
+}
+
+#[test]
+fn more_cuts_than_a_network_can_tell_apart_are_refused() {
+    let cuts = |shift: u32| -> Vec<String> {
+        let cut = |n| {
+            format!("kind = \"cable-cut\"; segment = \"press\"; position = \"{} m\"; cycle = 400; for = 1", n + shift)
+        };
+        (1..=35).map(cut).collect()
+    };
+    let both = [halls(&cuts(0)), halls(&cuts(35))];
+    let error = futures::<Near, _>(both.each_ref(), (300, None), (), |()| ()).expect_err("70 cuts");
+    assert_eq!(error, WhatIfError::Cuts);
+    assert!(error.to_string().contains("at most 64 places in both futures together"), "{error}");
+}
+
+#[test]
+fn a_run_without_headway_is_told_as_by_run() {
+    let room = Room::new();
+    let told = |arguments: &[&str]| {
+        let sets = ["--set", "run.duration=6 s", "--set", "run.max_events=3"];
+        let name = if arguments[0] == "run" { "--set" } else { "--run-set" };
+        let sets: Vec<_> = sets.iter().map(|word| if *word == "--set" { name } else { word }).collect();
+        let output = room.call(&[arguments, &sets].concat());
+        assert_eq!((output.status.code(), output.stdout.is_empty()), (Some(2), true), "{arguments:?}");
+        let said = String::from_utf8(output.stderr).expect("text");
+        let from = said
+            .find("more than 3 events per T_DP of 2 ms: the run makes no headway")
+            .unwrap_or_else(|| panic!("{said}"));
+        said[from..].to_owned()
+    };
+    let run = told(&["run", "scene.toml"]);
+    assert!(run.contains("; seen last:\n") && run.contains("Data_Exchange"), "{run}");
+    assert_eq!(told(&["replay", "scene.toml", "--cycle", "2900"]), run);
+    assert_eq!(told(&["replay", "scene.toml", "--cycle", "2900", "--set", "slave.4.crystal=9 ppm"]), run);
+    // Before the cycle all may be well, and after it not.
+    told(&["replay", "scene.toml", "--cycle", "40", "--set", "slave.4.crystal=9 ppm"]);
+    assert_eq!(std::fs::read_dir(room.path("out/scene")).expect("a directory").count(), 0, "nothing half-written");
+}
+
+#[test]
+fn the_program_alters_cuts_and_repeaters() {
+    let room = Room::new();
+    let cut = "\n[[disturbance]]\nkind = \"cable-cut\"\nposition = \"50 m\"\ncycle = 50\nfor = 2\n";
+    room.write("cut.toml", SCENE.to_owned() + cut);
+    let page = room.runs(&["replay", "cut.toml", "--cycle", "40", "--set", "disturbance.1.position=90 m"]);
+    assert!(page.contains("first difference: cycle 50"), "{page}");
+    let page = room.runs(&["replay", "cut.toml", "--cycle", "40", "--set", "disturbance.1.cycle=60"]);
+    let begins = page.lines().nth(4).expect("the original");
+    assert!(begins.starts_with("  original") && begins.ends_with("disturbance 1 begins"), "{page}");
+}
+
 #[test]
 fn what_has_happened_cannot_change() {
     assert_eq!(refused("life-sign-loss", &[("event.1.cycle", "99")], 100), WhatIfError::Past { cycle: 100 });

@@ -162,6 +162,12 @@ impl Axis {
 impl Application for Controller {
     type Command = Command;
 
+    fn power_on(&mut self, out: &mut Outbox) {
+        for axis in &mut self.axes {
+            axis.hold(Held::No, out);
+            (axis.control, axis.acknowledge, axis.jump) = (G1Stw::default(), 0, None);
+        }
+    }
     fn cycle(&mut self, _cycle: u64, mode: MasterMode, out: &mut Outbox) {
         for axis in &mut self.axes {
             if axis.joined && mode == MasterMode::Operate {
@@ -248,6 +254,29 @@ mod tests {
         assert_eq!(sent(1, Command::JumpLife(SLAVE, 9)), [1, 2, 3, 4, 9, 10, 11, 12, 13, 14]);
         assert_eq!(sent(2, Command::JumpLife(SLAVE, 9)), [1, 1, 2, 2, 9, 9, 10, 10, 11, 11]);
         assert_eq!(sent(1, Command::JumpLife(SLAVE, 0)), [1, 2, 3, 4, 0, 1, 2, 3, 4, 5]);
+    }
+
+    #[test]
+    fn what_was_ordered_before_the_supply_failed_is_forgotten() {
+        let mut out = Outbox::new();
+        let mut controller = Controller::new([SLAVE], LifeSettings { t_mapc: 1, start: 1, delay: 0 });
+        let parked = G1Stw::default().with(G1Stw::PARKING, true);
+        for order in [Command::HoldLife(SLAVE, None), Command::ControlWord(SLAVE, parked), Command::Acknowledge(SLAVE)]
+        {
+            controller.command(order, &mut out);
+        }
+        controller.power_on(&mut out);
+        controller.joined(0, true, &mut out);
+        let mut du = [0xFF; 4];
+        for sign in 1..=3 {
+            controller.cycle(u64::from(sign), MasterMode::Operate, &mut out);
+            controller.outputs(0, &mut du);
+            assert_eq!(du, [sign << 4, 0, 0, 0]);
+        }
+        let held = |held| {
+            out.observations().filter(|&seen| *seen == Observation::MasterLifeHeld { slave: SLAVE, held }).count()
+        };
+        assert_eq!((held(true), held(false)), (1, 1));
     }
 
     #[test]

@@ -70,6 +70,8 @@ pub trait Application {
     /// What the scenario may order it to do.
     type Command: Copy;
 
+    /// Its master has supply again: what it was ordered before is forgotten.
+    fn power_on(&mut self, out: &mut Outbox);
     /// A cycle begins.
     fn cycle(&mut self, cycle: u64, mode: MasterMode, out: &mut Outbox);
     /// Writes the outputs for a slave. Not called in Clear.
@@ -254,6 +256,7 @@ impl<A: Application> Master<A> {
             self.handlers[slave].restart(out);
             self.give_up_job(slave, out);
         }
+        self.app.power_on(out);
         self.commands.clear();
         self.overload.end();
         self.supervision.restart();

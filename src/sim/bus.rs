@@ -7,7 +7,7 @@ use crate::fdl::Route;
 use crate::sim::cut::Cuts;
 use crate::sim::noise::LinkJitter;
 use crate::sim::record::Origin;
-use crate::sim::topology::Delays;
+use crate::sim::topology::{Delays, Place};
 use crate::time::{Span, Time};
 use crate::wire::Frame;
 
@@ -109,10 +109,10 @@ impl Bus {
     const fn kept(&self) -> usize {
         if self.cuts.is_empty() { RECENT } else { RECENT * 8 }
     }
-    /// The cable is cut at the place called `name` from now on, or whole again.
-    pub fn cut(&mut self, name: &str, open: bool, now: Time) {
+    /// The disturbance called `name` cuts the cable at this place from now on, or it is whole again.
+    pub fn cut(&mut self, (name, place): (&str, Place), open: bool, now: Time) {
         let before = self.cuts.open();
-        self.cuts.set(name, open, now);
+        self.cuts.set((name, place), open, now);
         if open {
             return;
         }
@@ -135,9 +135,10 @@ impl Bus {
             !self.cuts.tear(flight.sender, listener, flight.start)
         }
     }
-    /// What the disturbance called `name` adds to the jitter of links counts from now on, or no more.
-    pub fn disturb_link(&mut self, name: &str, on: bool) {
-        self.jitter.iter_mut().for_each(|jitter| jitter.disturb(name, on));
+    /// What the disturbance called `name` adds, this half width to the jitter of the link of this index, counts from now on,
+    /// or no more.
+    pub fn disturb_link(&mut self, name: &str, what: (usize, Span), on: bool) {
+        self.jitter.iter_mut().for_each(|jitter| jitter.disturb(name, what, on));
     }
     /// The delays between the stations.
     pub const fn delays(&self) -> &Delays {

@@ -15,7 +15,8 @@ pub type CutSet = u64;
 /// All cuts that a network may have.
 #[derive(Clone, Debug, Default)]
 pub struct Cuts {
-    names: Vec<String>,
+    /// Each with the name of the disturbance that makes it.
+    named: Vec<(String, Place)>,
     /// On which side of each cut a station is, by station.
     sides: Vec<CutSet>,
     /// Those that are cut now.
@@ -40,15 +41,15 @@ impl Cuts {
         };
         let sides = places.iter().map(side).collect();
         let joined = vec![Time::ZERO; cuts.len()];
-        Self { names: cuts.into_iter().map(|(name, _)| name).collect(), sides, open: 0, joined }
+        Self { named: cuts, sides, open: 0, joined }
     }
     /// Cables that are never cut.
     pub const fn none() -> Self {
-        Self { names: Vec::new(), sides: Vec::new(), open: 0, joined: Vec::new() }
+        Self { named: Vec::new(), sides: Vec::new(), open: 0, joined: Vec::new() }
     }
     /// Whether no cable is ever cut.
     pub const fn is_empty(&self) -> bool {
-        self.names.is_empty()
+        self.named.is_empty()
     }
     /// The cuts between two stations, open or not.
     fn between(&self, a: usize, b: usize) -> CutSet {
@@ -76,9 +77,10 @@ impl Cuts {
         let since = |(number, &joined): (usize, &Time)| between >> number & 1 == 1 && start < joined;
         between & self.open != 0 || self.joined.iter().enumerate().any(since)
     }
-    /// The cut called `name` is open from now on, or closed.
-    pub fn set(&mut self, name: &str, open: bool, now: Time) {
-        let Some(number) = self.names.iter().position(|other| other == name) else { return };
+    /// The cut that the disturbance called `name` makes at this place is open from now on, or closed.
+    pub fn set(&mut self, (name, place): (&str, Place), open: bool, now: Time) {
+        let found = |(other, at): &(String, Place)| other == name && *at == place;
+        let Some(number) = self.named.iter().position(found) else { return };
         if open {
             self.open |= 1 << number;
         } else {
@@ -108,26 +110,29 @@ mod tests {
         let link = |from, to| Link { ends: [from, to], delay: Span::from_ns(9) };
         let tree = Tree::new(3, vec![link(at(0, 30), at(1, 0)), link(at(1, 50), at(2, 0))]).unwrap();
         let places = [at(0, 0), at(0, 20), at(0, 40), at(1, 10), at(2, 5)];
-        let mut cuts = Cuts::new(vec![("a".into(), at(0, 25)), ("b".into(), at(1, 20))], &tree, &places);
+        let (a, b) = (("a", at(0, 25)), ("b", at(1, 20)));
+        let mut cuts = Cuts::new(vec![("a".into(), a.1), ("b".into(), b.1)], &tree, &places);
         assert_eq!(pairs(&cuts, 5), []);
-        cuts.set("a", true, Time::ZERO);
+        cuts.set(a, true, Time::ZERO);
         assert_eq!(pairs(&cuts, 5), [(0, 2), (0, 3), (0, 4), (1, 2), (1, 3), (1, 4)]);
-        cuts.set("b", true, Time::ZERO);
+        cuts.set(b, true, Time::ZERO);
         assert_eq!(pairs(&cuts, 5).len(), 8, "three parts: 2, 2 and 1 stations");
-        cuts.set("a", false, Time::ZERO);
+        cuts.set(a, false, Time::ZERO);
         assert_eq!(pairs(&cuts, 5), [(0, 4), (1, 4), (2, 4), (3, 4)]);
-        cuts.set("other", true, Time::ZERO);
+        cuts.set(("other", a.1), true, Time::ZERO);
+        cuts.set(("a", b.1), true, Time::ZERO);
         assert_eq!(pairs(&cuts, 5).len(), 4);
     }
 
     #[test]
     fn a_telegram_needs_a_whole_cable_from_its_first_bit_on() {
         let ns = |ns| Time::ZERO + Span::from_ns(ns);
-        let mut cuts = Cuts::new(vec![("a".into(), at(0, 10))], &Tree::line(), &[at(0, 0), at(0, 20)]);
+        let a = ("a", at(0, 10));
+        let mut cuts = Cuts::new(vec![("a".into(), a.1)], &Tree::line(), &[at(0, 0), at(0, 20)]);
         assert!(!cuts.tear(0, 1, ns(50)));
-        cuts.set("a", true, ns(100));
+        cuts.set(a, true, ns(100));
         assert!(cuts.tear(0, 1, ns(50)) && !cuts.tear(1, 1, ns(50)));
-        cuts.set("a", false, ns(200));
+        cuts.set(a, false, ns(200));
         assert_eq!([50, 199, 200].map(|start| cuts.tear(1, 0, ns(start))), [true, true, false]);
     }
 }

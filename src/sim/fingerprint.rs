@@ -69,6 +69,9 @@ impl fmt::Display for Fingerprint {
 #[derive(Clone, Default)]
 struct Station {
     wire: Digest,
+    /// The first bit of the latest telegram, and what there was before it: it may be withdrawn. A station gives no other
+    /// telegram to the line before this one has left.
+    latest: Option<(Time, Digest)>,
     states: Digest,
     latches: Digest,
 }
@@ -138,9 +141,16 @@ impl Fingerprints {
 
 impl Recorder for Fingerprints {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
-        let wire = &mut self.station(telegram.sender).wire;
+        let Station { wire, latest, .. } = self.station(telegram.sender);
+        *latest = Some((telegram.start, wire.clone()));
         wire.instant(telegram.start);
         wire.octets(telegram.octets);
+    }
+    fn withdrawn(&mut self, sender: Address, now: Time) {
+        let Some(Station { wire, latest, .. }) = &mut self.stations[usize::from(sender.get())] else { return };
+        if let Some((_, before)) = latest.take_if(|(start, _)| *start > now) {
+            *wire = before;
+        }
     }
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         match what {
@@ -190,6 +200,30 @@ mod tests {
         assert_eq!(one.stations().next(), two.stations().next());
         assert_ne!(one.total().wire, two.total().wire);
         assert_ne!(one.total().latches, two.total().latches, "a station that is there counts");
+    }
+
+    #[test]
+    fn a_telegram_that_never_began_is_none() {
+        let [us, slave] = [Span::from_us(1), Span::from_us(2)].map(|span| Time::ZERO + span);
+        let slave = (Address::new(3).unwrap(), slave);
+        let [mut one, mut two] = [Fingerprints::new(MASTER), Fingerprints::new(MASTER)];
+        send(&mut one, 3, &[1, 2]);
+        send(&mut two, 3, &[1, 2]);
+        // Its first bit has left.
+        two.withdrawn(slave.0, us);
+        assert_eq!(one.total(), two.total());
+        two.telegram(&Transmission {
+            start: slave.1,
+            end: slave.1,
+            sender: slave.0,
+            octets: &[7],
+            origin: Origin::Sender,
+        });
+        assert_ne!(one.total(), two.total());
+        two.withdrawn(MASTER, us);
+        two.withdrawn(slave.0, us);
+        let [one, two] = [&one, &two].map(|all| all.stations().find(|(station, _)| *station == slave.0));
+        assert_eq!(one, two);
     }
 
     #[test]

@@ -220,8 +220,19 @@ pub(super) fn reaches(sigma: Span, bound: Span) -> bool {
 pub struct LinkJitter {
     half_width: Span,
     stream: Stream,
-    /// What disturbances add: name, half width, draws, and whether it counts now.
-    more: Vec<(String, Span, Stream, bool)>,
+    /// What disturbances add.
+    more: Vec<Addition>,
+}
+
+/// What a disturbance adds to the jitter of a link.
+#[derive(Clone, Debug)]
+struct Addition {
+    name: String,
+    /// Index of the link in the tree, and the half width: what else tells it from another one of this name.
+    what: (usize, Span),
+    stream: Stream,
+    /// Whether it counts now.
+    on: bool,
 }
 
 impl LinkJitter {
@@ -235,26 +246,27 @@ impl LinkJitter {
     }
     /// How much later than nominal the next telegram leaves the link. Signed.
     pub fn draw(&mut self) -> Span {
-        let more = self.more.iter_mut().filter(|(.., on)| *on);
         let own = self.stream.uniform(self.half_width);
-        more.fold(own, |sum, (_, half_width, stream, _)| sum + stream.uniform(*half_width))
+        let more = self.more.iter_mut().filter(|addition| addition.on);
+        more.fold(own, |sum, addition| sum + addition.stream.uniform(addition.what.1))
     }
-    /// Adds what the disturbance called `name` makes of the link in a run with `seed`, which does not count yet.
+    /// Adds what the disturbance called `name` makes of the link, `what` being the index of it and the half width, in a
+    /// run with `seed`. It does not count yet.
     ///
     /// # Panics
     /// If `half_width` is negative.
     #[must_use]
-    pub fn with(mut self, half_width: Span, seed: u64, name: &str) -> Self {
-        assert!(half_width >= Span::ZERO, "half width {half_width} is negative");
+    pub fn with(mut self, what: (usize, Span), seed: u64, name: &str) -> Self {
+        assert!(what.1 >= Span::ZERO, "half width {} is negative", what.1);
         // No station has the address 127.
         let stream = Stream::of_disturbance(seed, name, 127, Purpose::Repeater);
-        self.more.push((name.to_owned(), half_width, stream, false));
+        self.more.push(Addition { name: name.to_owned(), what, stream, on: false });
         self
     }
-    /// What the disturbance called `name` adds counts from now on, or no more.
-    pub(super) fn disturb(&mut self, name: &str, counts: bool) {
-        for (_, _, _, on) in self.more.iter_mut().filter(|(other, ..)| other == name) {
-            *on = counts;
+    /// What the disturbance called `name` adds, this half width to the link of this index, counts from now on, or no more.
+    pub(super) fn disturb(&mut self, name: &str, what: (usize, Span), counts: bool) {
+        for addition in self.more.iter_mut().filter(|other| other.name == name && other.what == what) {
+            addition.on = counts;
         }
     }
 }
@@ -327,10 +339,12 @@ mod tests {
         let strays: Vec<i64> = (0..10_000).map(|_| jitter.draw().ticks()).collect();
         assert!(strays.iter().all(|t| t.abs() <= US.ticks()) && strays.iter().any(|t| t.abs() > US.ticks() * 99 / 100));
         assert_eq!(LinkJitter::new(Span::ZERO, SEED, "a").draw(), Span::ZERO);
-        let mut more = LinkJitter::new(Span::ZERO, SEED, "a").with(US, SEED, "more");
+        let mut more = LinkJitter::new(Span::ZERO, SEED, "a").with((1, US), SEED, "more");
         let mut draws = |on: bool| {
-            more.disturb("other", !on);
-            more.disturb("more", on);
+            for (name, what) in [("other", (1, US)), ("more", (2, US)), ("more", (1, US * 2))] {
+                more.disturb(name, what, !on);
+            }
+            more.disturb("more", (1, US), on);
             more.draw()
         };
         assert!(draws(true) != Span::ZERO && draws(false) == Span::ZERO && draws(true) != Span::ZERO);

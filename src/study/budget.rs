@@ -7,7 +7,7 @@
 //!
 //! ```text
 //! part of a source   = (largest |e| with all - without it + with it alone - without any) / 2
-//! rest               = largest |e| without any source: rounding of the loop, and what the scenario disturbs
+//! rest               = largest |e| without any source: rounding of the loop, and what else the scenario disturbs
 //! interaction        = largest |e| with all - rest - all parts
 //! left               = T_PLL_W - largest |e| with all
 //! ```

@@ -18,7 +18,7 @@ use crate::fdl::active::HoldToken;
 use crate::observation::MasterMode;
 use crate::sim::crystal::Crystal;
 use crate::sim::fault::order::OrderFault;
-use crate::sim::fault::{Faults, What};
+use crate::sim::fault::{Disturbance, Faults, What};
 use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{self, Shaft};
 use crate::sim::network::{self, Act, Network, NetworkEvent, Site, Wiring};
@@ -171,6 +171,15 @@ pub fn slave_params(scenario: &Scenario, slave: &Slave) -> SlaveParams {
 /// # Panics
 /// If the scenario breaks a rule that reading it checks.
 pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> {
+    network_beside(scenario, scenario)
+}
+
+/// The same with paths on which the disturbances of `other` can act too, which sleep: a network that runs gets no new
+/// ones ([`Network::set_faults`]).
+///
+/// # Panics
+/// If the scenario breaks a rule that reading it checks, or both together have too many cuts ([`cuts_beside`]).
+pub fn network_beside<Q: Queue<NetworkEvent>>(scenario: &Scenario, other: &Scenario) -> Network<Node, Q> {
     let seed = scenario.run.seed;
     let master = &scenario.master;
     let mut sites = vec![Site {
@@ -190,7 +199,8 @@ pub fn network<Q: Queue<NetworkEvent>>(scenario: &Scenario) -> Network<Node, Q> 
     sites.extend(scenario.slaves.iter().map(|slave| site(scenario, slave)));
     sites.extend(scenario.class2.iter().map(|class2| class2_site(scenario, class2)));
     let jitter = JitterSource::new(master.gc_jitter.clone(), seed, master.address.get()).expect("a checked jitter");
-    let mut network = Network::new(scenario.bus.params.rate, (wiring(scenario), sites), jitter, faults(scenario));
+    let mut network =
+        Network::new(scenario.bus.params.rate, (wiring(scenario, other), sites), jitter, faults(scenario));
     order_disturbances(&mut network, scenario);
     order(&mut network, scenario, &scenario.events);
     network
@@ -252,25 +262,40 @@ fn order_bursts(scenario: &Scenario, slaves: &[Address], fault: OrderFault) -> [
     }
 }
 
-/// The cables; every repeater with jitter has its own draws, by its name.
-fn wiring(scenario: &Scenario) -> Wiring {
+/// The disturbances of `scenario`, and those of `other` that are not the same but for their windows.
+fn disturbances<'a>(scenario: &'a Scenario, other: &'a Scenario) -> impl Iterator<Item = &'a Disturbance> {
+    let known = |new: &&Disturbance| {
+        scenario.disturbances.iter().any(|disturbance| (&disturbance.name, &disturbance.what) == (&new.name, &new.what))
+    };
+    scenario.disturbances.iter().chain(other.disturbances.iter().filter(move |new| !known(new)))
+}
+/// The cuts of both scenarios, each with the name of the disturbance that makes it.
+pub fn cuts_beside(scenario: &Scenario, other: &Scenario) -> Vec<(String, Place)> {
+    let cut = |disturbance: &Disturbance| match disturbance.what {
+        What::Cut(place) => Some((disturbance.name.clone(), place)),
+        _ => None,
+    };
+    disturbances(scenario, other).filter_map(cut).collect()
+}
+
+/// The cables of `scenario`, with what the disturbances of both make of them; every repeater with jitter has its own
+/// draws, by its name.
+fn wiring(scenario: &Scenario, other: &Scenario) -> Wiring {
     let seed = scenario.run.seed;
     let jitter = scenario.topology.repeaters().iter().enumerate().filter_map(|(index, repeater)| {
-        let more = scenario.disturbances.iter().filter_map(|disturbance| match disturbance.what {
+        let more = disturbances(scenario, other).filter_map(|disturbance| match disturbance.what {
             What::Repeater(at, half_width) if at == index => Some((disturbance, half_width)),
             _ => None,
         });
         let own = LinkJitter::new(repeater.jitter, seed, &repeater.name);
         let mut more = more.peekable();
         let strays = repeater.jitter > Span::ZERO || more.peek().is_some();
-        let jitter = more.fold(own, |jitter, (disturbance, width)| jitter.with(width, seed, &disturbance.name));
+        let jitter =
+            more.fold(own, |jitter, (disturbance, width)| jitter.with((index, width), seed, &disturbance.name));
         strays.then_some((index, jitter))
     });
-    let cuts = scenario.disturbances.iter().filter_map(|disturbance| match disturbance.what {
-        What::Cut(place) => Some((disturbance.name.clone(), place)),
-        _ => None,
-    });
-    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect(), cuts: cuts.collect() }
+    let cuts = cuts_beside(scenario, other);
+    Wiring { tree: scenario.topology.tree().clone(), jitter: jitter.collect(), cuts }
 }
 
 /// Where a station is.

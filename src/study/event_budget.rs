@@ -8,10 +8,10 @@ use std::collections::VecDeque;
 use std::fmt::{self, Write as _};
 
 use super::run::{Progress, until};
-use super::scenario::{Extent, Scenario, When, Window};
+use super::scenario::{Scenario, When, Window};
 use crate::fdl::Station;
 use crate::observation::Observation;
-use crate::sim::network::{Network, NetworkEvent};
+use crate::sim::network::{Network, NetworkEvent, Until};
 use crate::sim::queue::Queue;
 use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::time::{Span, Time};
@@ -105,47 +105,91 @@ impl EventBudget {
         mut go_on: impl FnMut(Progress) -> bool,
     ) -> Result<bool, NoHeadway> {
         let end = until(scenario);
-        let in_cycles = matches!(scenario.run.duration, Extent::Cycles(_));
-        let (mut from, mut events) = (network.now(), 0);
-        let mut last_cycle = (network.cycles(), network.now());
+        let mut headway = self.headway(network, scenario);
         while !network.run(end, STRIDE, recorder) {
-            let now = network.now();
-            if !go_on(Progress { simulated: now.since_zero(), cycles: network.cycles() }) {
+            if !go_on(Progress { simulated: network.now().since_zero(), cycles: network.cycles() }) {
                 return Ok(false);
             }
-            events += STRIDE;
-            let cycles = (now - from).div_floor(self.cycle);
-            if events > self.per_cycle.saturating_mul(cycles as u64 + 2) {
-                let why =
-                    format!("more than {} events per T_DP of {}: the run makes no headway", self.per_cycle, self.cycle);
-                return Err(Self::stop(network, scenario, recorder, why));
-            }
-            if cycles >= COUNTED {
-                (from, events) = (now, 0);
-            }
-            if network.cycles() > last_cycle.0 {
-                last_cycle = (network.cycles(), now);
-            }
-            let waited = now - last_cycle.1.max(self.ordered_until);
-            if in_cycles && waited > PATIENCE {
-                let why = format!("no cycle has begun for {PATIENCE}, and the run is one of cycles");
-                return Err(Self::stop(network, scenario, recorder, why));
-            }
+            headway.check(STRIDE, network, recorder)?;
         }
         go_on(Progress { simulated: network.now().since_zero(), cycles: network.cycles() });
         Ok(true)
     }
 
+    /// The headway from now on of `network`, which is run as `scenario` says, for who does so step by step.
+    pub fn headway<S: Station, Q: Queue<NetworkEvent>>(&self, network: &Network<S, Q>, scenario: &Scenario) -> Headway {
+        let (end, now) = (until(scenario), network.now());
+        Headway { budget: *self, end, unseen: 0, from: now, events: 0, last_cycle: (network.cycles(), now) }
+    }
+}
+
+/// How far a run gets with how many events.
+#[derive(Clone, Debug)]
+pub struct Headway {
+    budget: EventBudget,
+    /// Where the run ends.
+    end: Until,
+    /// Events since the last look.
+    unseen: u64,
+    /// From when on events are counted, and how many there were.
+    from: Time,
+    events: u64,
+    /// Cycles begun, and when that was seen.
+    last_cycle: (u64, Time),
+}
+
+impl Headway {
+    /// `network` has had so many more events. It is looked at now and then.
+    ///
+    /// # Errors
+    /// It makes no headway.
+    #[inline]
+    pub fn check<S: Station, Q: Queue<NetworkEvent>, R: Recorder>(
+        &mut self,
+        events: u64,
+        network: &mut Network<S, Q>,
+        recorder: &mut R,
+    ) -> Result<(), NoHeadway> {
+        self.unseen += events;
+        if self.unseen < STRIDE { Ok(()) } else { self.look(network, recorder) }
+    }
+    fn look<S: Station, Q: Queue<NetworkEvent>, R: Recorder>(
+        &mut self,
+        network: &mut Network<S, Q>,
+        recorder: &mut R,
+    ) -> Result<(), NoHeadway> {
+        let EventBudget { per_cycle, cycle, ordered_until } = self.budget;
+        let now = network.now();
+        self.events += std::mem::take(&mut self.unseen);
+        let cycles = (now - self.from).div_floor(cycle);
+        if self.events > per_cycle.saturating_mul(cycles as u64 + 2) {
+            let why = format!("more than {per_cycle} events per T_DP of {cycle}: the run makes no headway");
+            return Err(self.stop(network, recorder, why));
+        }
+        if cycles >= COUNTED {
+            (self.from, self.events) = (now, 0);
+        }
+        if network.cycles() > self.last_cycle.0 {
+            self.last_cycle = (network.cycles(), now);
+        }
+        let waited = now - self.last_cycle.1.max(ordered_until);
+        if matches!(self.end, Until::Cycle(_)) && waited > PATIENCE {
+            let why = format!("no cycle has begun for {PATIENCE}, and the run is one of cycles");
+            return Err(self.stop(network, recorder, why));
+        }
+        Ok(())
+    }
+
     /// What is told of a run that makes no headway: it goes on for a moment to see what it does.
     fn stop<S: Station, Q: Queue<NetworkEvent>, R: Recorder>(
+        &self,
         network: &mut Network<S, Q>,
-        scenario: &Scenario,
         recorder: &mut R,
         why: String,
     ) -> NoHeadway {
         let (cycle, now) = (network.cycles().checked_sub(1), network.now());
         let mut tail = Tail::default();
-        network.run(until(scenario), TAIL, &mut (recorder, &mut tail));
+        network.run(self.end, TAIL, &mut (recorder, &mut tail));
         NoHeadway { why, cycle, now, last: tail.0.into() }
     }
 }

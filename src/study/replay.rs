@@ -7,6 +7,7 @@
 use std::fmt::Write as _;
 
 use super::build;
+use super::event_budget::{EventBudget, NoHeadway};
 use super::flight::stretch::Stretch;
 use super::flight::tape::Tape;
 use super::flight::{Recorded, Recording};
@@ -38,7 +39,7 @@ impl Window {
 }
 
 /// Why there is nothing to tell.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The run is over before.
     #[error("cycle {wanted} is not in this run, whose last cycle is {last}")]
@@ -51,12 +52,15 @@ pub enum ReplayError {
     /// No cycle ever began.
     #[error("no cycle begins in this run")]
     NoCycle,
+    /// The run makes no headway before.
+    #[error(transparent)]
+    NoHeadway(#[from] NoHeadway),
 }
 
 /// Runs `scenario` and tells the cycles of `window`, as far as the run has them.
 ///
 /// # Errors
-/// The run has not even the first of them.
+/// The run has not even the first of them, or makes no headway before their end.
 pub fn replay<Q: Queue<NetworkEvent>>(scenario: &Scenario, window: Window) -> Result<String, ReplayError> {
     Ok(text(&record::<Q>(scenario, window)?))
 }
@@ -64,13 +68,16 @@ pub fn replay<Q: Queue<NetworkEvent>>(scenario: &Scenario, window: Window) -> Re
 /// Runs `scenario` and keeps the cycles of `window`, as far as the run has them: one stretch.
 ///
 /// # Errors
-/// The run has not even the first of them.
+/// As [`replay`].
 pub fn record<Q: Queue<NetworkEvent>>(scenario: &Scenario, window: Window) -> Result<Recording, ReplayError> {
     let mut network: Network<Node, Q> = build::network(scenario);
     let recorded = Recorded::of(scenario);
     let mut watch = Watcher { window, master: scenario.master.address, tape: recorded.tape(0), last: None, kept: None };
+    let mut headway = EventBudget::of(scenario).headway(&network, scenario);
     let end = until(scenario);
-    while watch.kept.is_none() && !network.run(end, STRIDE, &mut watch) {}
+    while watch.kept.is_none() && !network.run(end, STRIDE, &mut watch) {
+        headway.check(STRIDE, &mut network, &mut watch)?;
+    }
     let last = watch.last;
     let stretch = watch.finish(network.now());
     match (stretch, last) {

@@ -7,7 +7,7 @@ use super::build;
 use super::count::Counts;
 use super::episode::Episodes;
 use super::event_budget::{EventBudget, NoHeadway};
-use super::export::{EXPORTERS, ExportError, Exports, Staged, Target, capture};
+use super::export::{self, EXPORTERS, ExportError, Exports, Staged, Target, capture};
 use super::figure::Figures;
 use super::first_fault::FirstFaults;
 use super::flight::{FlightRecorder, Recording};
@@ -15,7 +15,9 @@ use super::histogram::{Histogram, Histograms, Quantity, Subject};
 use super::layout::{Layout, MasterLayout, SlaveLayout};
 use super::metric::{Metrics, Shafts};
 use super::plan::rules;
-use super::plot::{BusCycle, Distribution, Distributions, EpisodeTimes, LinkLatencies, PlotError, PlotMeta, Plots};
+use super::plot::{
+    self, BusCycle, Distribution, Distributions, EpisodeTimes, LinkLatencies, PlotError, PlotMeta, Plots,
+};
 use super::row::Sink;
 use super::scenario::{Extent, Scenario};
 use super::steady::{SteadyState, SteadySummary};
@@ -153,11 +155,12 @@ pub const fn until(scenario: &Scenario) -> Until {
     }
 }
 
-/// Runs `scenario`. Files go to `out/<scenario>/` if `out` is given and the scenario wants any. `watch` is told the
-/// progress now and then; it cannot change the run.
+/// Runs `scenario`. Files go to `out/<scenario>/` if `out` is given and the scenario wants any; what earlier runs left there
+/// under names of a run's files goes, so that all of them are of one run. `watch` is told the progress now and then; it
+/// cannot change the run.
 ///
 /// # Errors
-/// A file that cannot be written. None is left half-written.
+/// A file that cannot be written, and then none is left half-written; or one of an earlier run that cannot be removed.
 pub fn run<Q: Queue<NetworkEvent>>(
     scenario: &Scenario,
     out: Option<&Path>,
@@ -245,10 +248,17 @@ fn conclude(
         pictures.extend(capture::stage(dir, flight)?);
         summary.files.extend(capture::FORMATS.iter().map(|format| format.file.to_owned()));
     }
-    if let Some(exports) = exports {
-        exports.finish(pictures, figures.histograms(), &mut summary)?;
+    if let (Some(dir), Some(exports)) = (&dir, exports) {
+        let placed = exports.finish(pictures, figures.histograms(), &mut summary)?;
+        export::clear(dir, files(), &placed)?;
     }
     Ok(Outcome { summary, fingerprint, stations: fingerprints.stations().collect(), statistics, figures, dir })
+}
+
+/// Every name that a file of a run can have.
+fn files() -> impl Iterator<Item = String> {
+    let texts = plot::files().chain([TOPOLOGY]).chain(capture::FORMATS.iter().map(|format| format.file));
+    texts.map(str::to_owned).chain(EXPORTERS.iter().flat_map(|exporter| (exporter.every)()))
 }
 
 /// Writes pictures and texts under temporary names.

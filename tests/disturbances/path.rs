@@ -7,12 +7,12 @@ use isodp::time::{Span, Time};
 use super::{bursts, disturbed, prints, refused, sends_in, tables};
 use crate::support::{Run, address};
 
-fn no_answers(run: &Run, slave: u8) -> usize {
+pub(super) fn no_answers(run: &Run, slave: u8) -> usize {
     let is = |what: &Observation| matches!(what, Observation::NoAnswer { slave: of } if *of == address(slave));
     run.events_of(2).filter(|row| is(&row.what)).count()
 }
 /// From t0 of a cycle to the first bit of a slave's reply in it.
-fn reply_at(run: &Run, slave: u8, cycle: u64) -> Span {
+pub(super) fn reply_at(run: &Run, slave: u8, cycle: u64) -> Span {
     let t0 = run.cycles.iter().find(|row| row.cycle == cycle).expect("a cycle").t0;
     let replies: Vec<Time> =
         run.telegrams_in(cycle).filter(|(_, _, by, _)| *by == address(slave)).map(|&(start, ..)| start).collect();
@@ -71,7 +71,7 @@ fn no_strength_changes_nothing() {
 }
 
 /// Two halls with a repeater between them, a slave before it and two behind it.
-fn halls(more: &[&str]) -> Run {
+pub(super) fn halls(more: &[&str]) -> Run {
     let text = r#"
 [run]
 seed = 5

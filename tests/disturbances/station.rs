@@ -1,11 +1,18 @@
 //! Stations that fall silent, grow deaf or lose their supply, and a master's application that errs.
 
-use isodp::observation::{ClockVerdict, Disturbance, HandlerState, LifeState, MasterMode, Observation, Phase};
+use isodp::device::node::Node;
+use isodp::observation::{
+    ClockVerdict, Disturbance, HandlerState, LifeState, MasterMode, Observation, Phase, SlaveCause,
+};
 use isodp::sim::fingerprint::{Fingerprint, Fingerprints};
-use isodp::sim::network::NetworkEvent;
+use isodp::sim::network::{Network, NetworkEvent, Until};
 use isodp::sim::queue::NearQueue;
+use isodp::sim::record::{Origin, Recorder, Stamp, Transmission};
+use isodp::study::build;
+use isodp::study::scenario::Scenario;
 use isodp::study::what_if;
 use isodp::time::{Span, Time};
+use isodp::wire::Address;
 
 use super::{bursts, changed, disturbed, prints, refused, scene, sends_in, tables};
 use crate::support::{Run, address};
@@ -127,6 +134,78 @@ fn a_master_that_was_off_starts_its_slaves_anew_and_its_application_knows() {
         assert_eq!(count(&run, 2, forgotten), 1, "the application of slave {slave}");
         assert_eq!(run.phases_of(slave).last().map(|&(phase, _)| phase), Some(Phase::Operation));
     }
+}
+
+/// A class 1 master beside the isochronous one, with a slave of its own.
+#[test]
+fn a_further_master_can_lose_its_supply_too() {
+    let text = "[run]\ncycles = 1500\n[bus]\nrate = \"12 Mbit/s\"\nhsa = 15\nt_tr = \"21000 tbit\"\n\
+                [master]\naddress = 2\nt_dp = \"2 ms\"\nt_i = \"125 us\"\nt_o = \"1 ms\"\nt_pll_w = \"1 us\"\n\
+                [[class1]]\naddress = 5\n[[slave]]\naddresses = \"3..4\"\ndevice = \"posital-ocd-dpb1b\"\n\
+                [[slave]]\naddress = 10\nmaster = 5\ndevice = \"posital-ocd-dpb1b\"\n";
+    // Cycles are those of [master], which goes on.
+    for window in ["at = \"600 ms\"; for = \"400 ms\"", "cycle = 300; for = 200"] {
+        let text = [text, &tables(&[&format!("kind = \"restart\"; station = 5; {window}")])].concat();
+        let scenario = Scenario::parse("two", "two.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let run = Run::of(&scenario);
+        assert!(sends_in(&run, 5, 310..490).is_empty(), "{window}");
+        let thrown_out =
+            |what: &Observation| matches!(what, Observation::SlaveState { cause: SlaveCause::Watchdog, .. });
+        assert_eq!(count(&run, 10, thrown_out), 1, "{window}");
+        let entered = |what: &Observation| matches!(what, Observation::RingEntered);
+        assert_eq!(count(&run, 5, entered), 2, "{window}");
+        // Both are what they were, and the isochronous network has not seen more than the one lost token.
+        assert!(sends_in(&run, 10, 1_400..1_490).len() > 40, "{window}");
+        for slave in 3..=4 {
+            let operations = run.phases_of(slave).into_iter().filter(|&(phase, _)| phase == Phase::Operation).count();
+            assert_eq!((operations, run.counts_of(slave).fault_count()), (1, 0), "slave {slave}, {window}");
+        }
+    }
+}
+
+/// Every telegram that reached the line, or may still.
+#[derive(Default)]
+struct Line {
+    sent: Vec<(Time, Address, Vec<u8>)>,
+    withdrawn: usize,
+}
+impl Recorder for Line {
+    fn telegram(&mut self, telegram: &Transmission<'_>) {
+        self.sent.push((telegram.start, telegram.sender, telegram.octets.to_vec()));
+    }
+    fn observe(&mut self, _: Stamp<'_>, _: &Observation) {}
+    fn withdrawn(&mut self, sender: Address, now: Time) {
+        let before = self.sent.len();
+        self.sent.retain(|&(start, by, _)| by != sender || start <= now);
+        self.withdrawn += before - self.sent.len();
+    }
+}
+
+/// At whatever instant of a cycle the supply fails: the fingerprint of the wire is that of what was on it.
+#[test]
+fn what_a_station_could_not_send_any_more_is_in_no_fingerprint() {
+    let mut withdrawn = 0;
+    for step in 0..80 {
+        let off = format!("at = \"{} us\"; for = \"20 ms\"", 100_000 + step * 25);
+        let keys =
+            ["2", "3"].map(|station| format!("kind = \"restart\"; name = \"{station}\"; station = {station}; {off}"));
+        let sets = [("run.cycles", "70")];
+        let scenario = changed(&sets, &tables(&keys.each_ref().map(String::as_str)));
+        let mut network: Network<Node, NearQueue<NetworkEvent>> = build::network(&scenario);
+        let mut recorder = (Fingerprints::new(address(2)), Line::default());
+        assert!(network.run(Until::Cycle(70), 10_000_000, &mut recorder));
+        let (prints, line) = recorder;
+        let mut expected = Fingerprints::new(address(2));
+        for (start, sender, octets) in &line.sent {
+            let origin = Origin::Sender;
+            let telegram = Transmission { start: *start, end: *start, sender: *sender, octets, origin };
+            expected.telegram(&telegram);
+        }
+        let wires = |prints: &Fingerprints| prints.stations().map(|(by, print)| (by, print.wire)).collect::<Vec<_>>();
+        assert_eq!(wires(&prints), wires(&expected), "{off}");
+        withdrawn += line.withdrawn;
+    }
+    assert!(withdrawn > 20, "{withdrawn}");
 }
 
 #[test]

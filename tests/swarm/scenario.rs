@@ -1,6 +1,7 @@
 //! Random scenarios as text. They are meant to be valid: times come from the planner's proposal, and what goes wrong
 //! is over at [`Case::quiet`], where everything is ordered back to normal.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::disturbance::{Scene, disturbance};
@@ -9,6 +10,7 @@ use isodp::fdl::params::BusParams;
 use isodp::study::plan::proposal::Proposal;
 use isodp::study::scenario::Scenario;
 use isodp::time::{BitRate, Span};
+use isodp::wire::Address;
 
 /// GSD files are looked for beside this file, which does not exist.
 const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/swarm.toml");
@@ -47,9 +49,21 @@ pub(super) struct Case {
     pub(super) asking: Vec<u8>,
     /// The last cycle with a disturbance.
     pub(super) last_cycle: u64,
+    /// Whether masters are restarted at the end.
+    pub(super) restarts: bool,
 }
 
 impl Case {
+    /// The same, with the supply of these masters off for a cycle when all else is over.
+    pub(super) fn with_restarts(mut self, masters: &BTreeSet<Address>) -> Self {
+        for master in masters {
+            order(&mut self.text, self.quiet, &format!("do = \"power-off\"\nstation = {master}"));
+            order(&mut self.text, self.quiet + self.cycle, &format!("do = \"power-on\"\nstation = {master}"));
+        }
+        self.quiet += self.cycle * 2;
+        self.restarts = true;
+        self
+    }
     /// The scenario, or why it is refused.
     pub(super) fn scenario(&self) -> Result<Scenario, String> {
         Scenario::parse("swarm", SOURCE, &self.text, &[]).map_err(|error| error.to_string())
@@ -95,11 +109,11 @@ pub(super) fn case(seed: u64) -> Result<Case, String> {
     // Connections take seconds to run out: not every network has the time.
     let share = draw.one(&[0, 0, 80]);
     let asking: Vec<u8> = network.class2.iter().copied().filter(|_| draw.percent(share)).collect();
-    let jobs = jobs(draw, &network, &asking);
+    let jobs = jobs(draw, &network, &asking, cycle);
     let end = last + cycle * 100_000;
     let run = format!("seed = {}\nduration = \"{} us\"", seed % 1_000, end.ticks() / 12_000);
     let text = network.text(&run, &ring, &times, &[jobs, events].concat());
-    Ok(Case { text, quiet: last + cycle, cycle, token_at_risk, asking, last_cycle: 60 + 400 })
+    Ok(Case { text, quiet: last + cycle, cycle, token_at_risk, asking, last_cycle: 60 + 400, restarts: false })
 }
 
 impl Network {
@@ -359,12 +373,14 @@ fn master_keys(draw: &mut Draw, clocked: bool, places: &Places) -> String {
     text
 }
 
-fn jobs(draw: &mut Draw, network: &Network, asking: &[u8]) -> String {
+fn jobs(draw: &mut Draw, network: &Network, asking: &[u8], cycle: Span) -> String {
     let mut text = String::new();
+    // With one request per token, each of these slaves is polled once in so many rotations.
+    let timeout = Span::from_ms(100).max(cycle * 4 * network.slaves.len() as i64).ceil_to(Span::from_ms(10));
     for address in &network.class2 {
         let _ = write!(
             text,
-            "[[class2]]\naddress = {address}\nresponse_timeout = \"100 ms\"\nper_token = {}\n",
+            "[[class2]]\naddress = {address}\nresponse_timeout = \"{timeout}\"\nper_token = {}\n",
             draw.within(1..=4)
         );
         text.push_str(&network.place_of_tools());

@@ -13,7 +13,8 @@ use crate::sim::fault::station::StationFault;
 use crate::sim::fault::turn::{Turn, Turns};
 use crate::sim::fault::{self, What};
 use crate::sim::record::Recorder;
-use crate::time::Time;
+use crate::sim::topology::Place;
+use crate::time::{Span, Time};
 use crate::wire::Address;
 
 /// A disturbance that begins and ends, in this network.
@@ -38,10 +39,10 @@ pub(super) enum Effect<C> {
     None,
     /// The supply goes off and on.
     Supply,
-    /// A link has more jitter.
-    Link,
-    /// A cable is cut and whole again.
-    Cut,
+    /// The link of this index has more jitter, by this half width.
+    Link(usize, Span),
+    /// A cable is cut at this place and whole again.
+    Cut(Place),
     /// Crystals run at other rates.
     Crystals(Tuning),
     /// Something comes onto the line.
@@ -89,8 +90,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             What::Station(_, StationFault::Restart) => Effect::Supply,
             What::Crystal(_, fault) => Effect::Crystals(Tuning { pulls, interval: fault.interval(), planned: false }),
             What::Order(_, fault) => Effect::Orders { fault, begin: Vec::new(), end: Vec::new() },
-            What::Repeater(..) => Effect::Link,
-            What::Cut(_) => Effect::Cut,
+            What::Repeater(link, half_width) => Effect::Link(link, half_width),
+            What::Cut(place) => Effect::Cut(place),
             What::Line(_) | What::Source(_) | What::Station(..) | What::Clock(..) | What::Instant(..) => {
                 source.map_or(Effect::None, Effect::Source)
             }
@@ -179,8 +180,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Effect::Crystals(_) => self.turn_crystals(index, on),
             Effect::Orders { fault, .. } => self.order_burst((index, fault), on, recorder),
             Effect::Source(_) if on => self.start_source(index),
-            Effect::Link => self.bus.disturb_link(&self.turning[index].name, on),
-            Effect::Cut => self.bus.cut(&self.turning[index].name, on, self.now),
+            Effect::Link(link, half_width) => {
+                self.bus.disturb_link(&self.turning[index].name, (link, half_width), on);
+            }
+            Effect::Cut(place) => self.bus.cut((&self.turning[index].name, place), on, self.now),
             Effect::Source(_) | Effect::None | Effect::Supply => {}
         }
         self.plan_turn(index);

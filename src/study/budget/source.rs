@@ -1,5 +1,19 @@
 //! Sources: what makes the instant of SYNCH at an encoder differ from its prediction, and how each is switched off.
+//!
+//! | of the network | as a disturbance |
+//! |---|---|
+//! | `master.gc_jitter` | gc-jitter |
+//! | `repeater.N.jitter` | repeater-jitter |
+//! | each `crystal` | crystal-offset, crystal-wander, temperature-step |
+//! | the timer grid of the slaves | |
+//! | | receiver-jitter |
+//!
+//! All disturbances of one kind are one source. Model: other kinds take telegrams or stations away, or hold SYNCH up; they
+//! are no jitter, and what comes of them stays in the rest.
 
+use crate::sim::fault::What;
+use crate::sim::fault::clock::CrystalFault;
+use crate::sim::fault::instant::InstantFault;
 use crate::sim::jitter::GcJitter;
 use crate::study::scenario::{Crystal, Scenario, Topology};
 use crate::time::Span;
@@ -25,8 +39,14 @@ pub struct Source {
 #[rustfmt::skip]
 pub const SOURCES: &[Source] = &[
     Source { name: "gc_jitter", title: "GC jitter", present: has_gc_jitter, off: |scenario| scenario.master.gc_jitter = GcJitter::None },
+    Source { name: "gc_jitter_disturbance", title: "disturbed GC", present: |scenario| has(scenario, strays_clock), off: |scenario| without(scenario, strays_clock) },
     Source { name: "repeaters", title: "repeaters", present: has_repeater_jitter, off: without_repeater_jitter },
+    Source { name: "repeater_jitter", title: "disturbed repeaters", present: |scenario| has(scenario, strays_repeater), off: |scenario| without(scenario, strays_repeater) },
+    Source { name: "receiver_jitter", title: "receivers", present: |scenario| has(scenario, strays_receiver), off: |scenario| without(scenario, strays_receiver) },
     Source { name: "crystals", title: "crystals", present: has_crystals, off: without_crystals },
+    Source { name: "crystal_offset", title: "crystal jumps", present: |scenario| has(scenario, jumps), off: |scenario| without(scenario, jumps) },
+    Source { name: "crystal_wander", title: "crystal wander", present: |scenario| has(scenario, wanders), off: |scenario| without(scenario, wanders) },
+    Source { name: "temperature_step", title: "temperature", present: |scenario| has(scenario, warms), off: |scenario| without(scenario, warms) },
     Source { name: "quantum", title: "timer grid", present: has_quantum, off: without_quantum },
 ];
 
@@ -44,6 +64,33 @@ fn without_repeater_jitter(scenario: &mut Scenario) {
     }
     scenario.topology =
         Topology::new(scenario.topology.segments().to_vec(), repeaters).expect("the tree it was before");
+}
+
+/// Whether a scenario has a disturbance that `is` one of these.
+fn has(scenario: &Scenario, is: fn(&What) -> bool) -> bool {
+    scenario.disturbances.iter().any(|disturbance| is(&disturbance.what))
+}
+/// Takes them out; the draws of the others hang on their names.
+fn without(scenario: &mut Scenario, is: fn(&What) -> bool) {
+    scenario.disturbances.retain(|disturbance| !is(&disturbance.what));
+}
+fn strays_clock(what: &What) -> bool {
+    matches!(what, What::Clock(jitter, _) if *jitter != GcJitter::None)
+}
+fn strays_repeater(what: &What) -> bool {
+    matches!(what, What::Repeater(_, half_width) if *half_width > Span::ZERO)
+}
+fn strays_receiver(what: &What) -> bool {
+    matches!(what, What::Instant(_, InstantFault::Receiver { half_width }) if *half_width > Span::ZERO)
+}
+fn jumps(what: &What) -> bool {
+    matches!(what, What::Crystal(_, fault @ CrystalFault::Offset(_)) if fault.bound() > 0)
+}
+fn wanders(what: &What) -> bool {
+    matches!(what, What::Crystal(_, fault @ CrystalFault::Wander { .. }) if fault.bound() > 0)
+}
+fn warms(what: &What) -> bool {
+    matches!(what, What::Crystal(_, fault @ CrystalFault::Temperature { .. }) if fault.bound() > 0)
 }
 
 const NONE: Crystal = Crystal::Offset(0);

@@ -11,7 +11,7 @@ use crate::sim::network::{Network, NetworkEvent, Until};
 use crate::sim::queue::Queue;
 use crate::sim::record::Recorder;
 use crate::study::build;
-use crate::study::event_budget::PATIENCE;
+use crate::study::event_budget::{Headway, NoHeadway, PATIENCE};
 use crate::study::run::until;
 use crate::study::scenario::Scenario;
 use crate::time::{Span, Time};
@@ -50,6 +50,8 @@ pub(in crate::study) struct Runner<Q, R> {
     pub(in crate::study) cycle: Option<u64>,
     /// Where it ends.
     pub(in crate::study) end: End,
+    /// Who sees to it that it makes headway, if anyone does.
+    pub(in crate::study) guard: Option<Headway>,
     /// Who rides along.
     pub(in crate::study) rider: R,
 }
@@ -61,14 +63,18 @@ struct Side<Q, R> {
     recorder: (Tape, R),
     /// Cycles begun, and the instant of this many.
     headway: (u64, Time),
+    guard: Option<Headway>,
+    /// Why it did not come to its end.
+    failed: Option<NoHeadway>,
     over: bool,
 }
 
 impl<Q: Queue<NetworkEvent>, R: Recorder> Side<Q, R> {
     fn new(runner: Runner<Q, R>) -> Self {
-        let Runner { network, master, cycle, end, rider } = runner;
+        let Runner { network, master, cycle, end, guard, rider } = runner;
         let headway = (network.cycles(), network.now());
-        Self { network, end, recorder: (Tape::new(master, cycle, end.cycle), rider), headway, over: false }
+        let recorder = (Tape::new(master, cycle, end.cycle), rider);
+        Self { network, end, recorder, headway, guard, failed: None, over: false }
     }
     /// Runs to `to`, or to the end if that is earlier. Tells how far it came.
     fn advance(&mut self, to: Time) -> Time {
@@ -77,6 +83,10 @@ impl<Q: Queue<NetworkEvent>, R: Recorder> Side<Q, R> {
             self.over = self.end.cycle.is_some_and(|last| self.network.cycles() > last);
             if self.over || self.network.run(Until::Time(to), 1, &mut self.recorder) {
                 break;
+            }
+            if let Some(guard) = &mut self.guard {
+                self.failed = guard.check(1, &mut self.network, &mut self.recorder).err();
+                self.over = self.failed.is_some();
             }
         }
         if self.network.cycles() > self.headway.0 {
@@ -109,6 +119,7 @@ impl<Q: Queue<NetworkEvent>, R: Recorder> Race<Q, R> {
             master: scenario.master.address,
             cycle: None,
             end: End::of(scenario),
+            guard: None,
             rider,
         };
         Self::of([runner(before, rider), runner(now, other)], before.master.t_dp)
@@ -133,12 +144,29 @@ impl<Q: Queue<NetworkEvent>, R: Recorder> Race<Q, R> {
         &mut self.sides[1].network
     }
     /// Both to their ends. Gives what is different, and for each network its end and its rider.
+    ///
+    /// # Errors
+    /// One of them is guarded and makes no headway.
+    pub(in crate::study) fn run_guarded(mut self) -> Result<(Differences, [(Time, R); 2]), NoHeadway> {
+        self.advance_to_the_ends();
+        match self.sides.iter_mut().find_map(|side| side.failed.take()) {
+            Some(failed) => Err(failed),
+            None => Ok(self.finish()),
+        }
+    }
+    /// The same of networks without a guard.
     pub fn run(mut self) -> (Differences, [(Time, R); 2]) {
+        self.advance_to_the_ends();
+        self.finish()
+    }
+    fn advance_to_the_ends(&mut self) {
         let mut to = self.sides[0].network.now().max(self.sides[1].network.now());
         while self.sides.iter().any(|side| !side.over) {
             to += self.stride;
             self.advance(to);
         }
+    }
+    fn finish(self) -> (Differences, [(Time, R); 2]) {
         let differences = Differences::new(&self.found);
         (differences, self.sides.map(|side| (side.network.now(), side.recorder.1)))
     }

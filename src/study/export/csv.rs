@@ -19,7 +19,7 @@ use crate::time::Span;
 
 /// Tables of all rows.
 pub const EXPORTER: Exporter =
-    Exporter { name: "csv", what: "tables of cycles, slaves, links and events", files: names, open };
+    Exporter { name: "csv", what: "tables of cycles, slaves, links and events", files: names, every, open };
 
 /// Rows of `events.csv` that are kept.
 pub const EVENT_ROWS: u64 = 100_000;
@@ -28,6 +28,10 @@ const CYCLES: &str = "cycles.csv";
 const SLAVES: &str = "slaves.csv";
 const LINKS: &str = "links.csv";
 const EVENTS: &str = "events.csv";
+
+fn every() -> Vec<String> {
+    [CYCLES, SLAVES, LINKS, EVENTS].map(str::to_owned).into()
+}
 
 /// A column of a table: its title and how a row's cell is written.
 struct Column<R>(&'static str, fn(&R, &mut Cell));

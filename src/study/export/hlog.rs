@@ -23,7 +23,7 @@ use crate::time::Span;
 
 /// Distributions for HdrHistogram's tools.
 pub const EXPORTER: Exporter =
-    Exporter { name: "hlog", what: "distributions in the interval log of HdrHistogram", files: names, open };
+    Exporter { name: "hlog", what: "distributions in the interval log of HdrHistogram", files: names, every, open };
 
 type Log<'a> = IntervalLogWriter<'a, 'a, BufWriter<Staged>, V2DeflateSerializer>;
 
@@ -40,6 +40,10 @@ fn name(quantity: &Quantity) -> String {
 
 fn names(target: &Target<'_>) -> Vec<String> {
     quantities(target.layout).map(name).collect()
+}
+
+fn every() -> Vec<String> {
+    QUANTITIES.iter().map(name).collect()
 }
 
 fn open(target: &Target<'_>) -> Result<Box<dyn Export>, ExportError> {

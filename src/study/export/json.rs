@@ -9,13 +9,17 @@ use crate::study::row::Sink;
 use crate::study::summary::Summary;
 
 /// The summary for other programs.
-pub const EXPORTER: Exporter = Exporter { name: "json", what: "the summary for other programs", files: names, open };
+pub const EXPORTER: Exporter =
+    Exporter { name: "json", what: "the summary for other programs", files: names, every, open };
 
 const SUMMARY: &str = "summary.json";
 
 struct Json(Staged);
 
 fn names(_: &Target<'_>) -> Vec<String> {
+    every()
+}
+fn every() -> Vec<String> {
     vec![SUMMARY.to_owned()]
 }
 

@@ -58,6 +58,8 @@ pub struct Exporter {
     pub what: &'static str,
     /// The names of its files.
     pub files: fn(&Target<'_>) -> Vec<String>,
+    /// The names that its files can have in any run.
+    pub every: fn() -> Vec<String>,
     /// Begins its files.
     pub open: fn(&Target<'_>) -> Result<Box<dyn Export>, ExportError>,
 }
@@ -101,6 +103,21 @@ impl Exports {
         }
         Staged::place_all(staged)
     }
+}
+
+/// Removes the files of earlier runs in `dir` that this run has not written: those called as one of `names`, but for
+/// `placed`. What is called otherwise, or is no file, stays.
+///
+/// # Errors
+/// The first one that cannot be removed.
+pub fn clear(dir: &Path, names: impl Iterator<Item = String>, placed: &[PathBuf]) -> Result<(), ExportError> {
+    let old = names.map(|name| dir.join(name)).filter(|path| !placed.contains(path));
+    for path in old.filter(|path| path.is_file()) {
+        if let Err(source) = fs::remove_file(&path) {
+            return Err(ExportError::Remove { path, source });
+        }
+    }
+    Ok(())
 }
 
 impl core::fmt::Debug for Exports {
@@ -149,6 +166,34 @@ mod tests {
     fn finish(exports: Exports) -> Result<Vec<PathBuf>, ExportError> {
         let mut summary = Summary { files: Vec::new(), ..sample::run() };
         exports.finish(Vec::new(), &Histograms::new(&sample::layout()), &mut summary)
+    }
+
+    #[test]
+    fn exporters_know_every_name_that_their_files_can_have() {
+        let layout = sample::layout();
+        let target = Target { dir: Path::new(""), layout: &layout, cycles: 3, rows: 100, tables: CsvTable::EVERY };
+        let mut all = BTreeSet::new();
+        for exporter in EXPORTERS {
+            let every: BTreeSet<_> = (exporter.every)().into_iter().collect();
+            assert!((exporter.files)(&target).iter().all(|name| every.contains(name)), "{}", exporter.name);
+            let count = all.len() + every.len();
+            all.extend(every);
+            assert_eq!(all.len(), count, "{}: a name of another exporter", exporter.name);
+        }
+    }
+
+    #[test]
+    fn only_files_of_known_names_that_were_not_written_are_cleared() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = |name: &str| dir.path().join(name);
+        for name in ["old.txt", "new.txt", "mine.txt"] {
+            fs::write(path(name), name).unwrap();
+        }
+        fs::create_dir(path("old.d")).unwrap();
+        let known = ["old.txt", "new.txt", "old.d", "never.txt"].map(str::to_owned);
+        clear(dir.path(), known.into_iter(), &[path("new.txt")]).unwrap();
+        let left: BTreeSet<_> = ["new.txt", "mine.txt", "old.d"].map(str::to_owned).into();
+        assert_eq!(names(dir.path()), left);
     }
 
     #[test]

@@ -33,6 +33,14 @@ pub enum ExportError {
         /// Why.
         source: io::Error,
     },
+    /// What an earlier run left cannot be removed.
+    #[error("cannot remove {}, which an earlier run has left: {source}", path.display())]
+    Remove {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
     /// The finished file cannot take its place.
     #[error("cannot put {} in its place: {source}", path.display())]
     Place {

@@ -1,22 +1,27 @@
 //! Families: what is counted or noted once in a run, of the network, a slave, a link, a master, a station or acyclic
 //! services. Distributions are not among them; every quantity has its own.
 
+use std::collections::BTreeMap;
+
 use super::Figures;
 use super::value::{Unit, Value};
 use crate::observation::{AcyclicResult, MasterMode, Phase, PllState, SlaveState};
 use crate::study::acyclic::ClassCounts;
 use crate::study::count::{LinkCounts, Moment, Rotation, SlaveCounts};
-use crate::study::episode::{Harm, SlaveEpisodes, Spread};
+use crate::study::episode::{Harm, SlaveEpisodes, Spread, Times};
 use crate::study::histogram::Subject;
 use crate::study::live_list::{CycleTimes, Station};
 use crate::study::masters::MasterCounts;
 use crate::study::steady::Begin;
 use crate::time::Span;
 
+/// What stands for the code of a fault in the name of a family.
+pub const CODE: &str = "<code>";
+
 /// A figure of every subject of one kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Family {
-    /// Its name, the end of a figure's; `<code>` stands for four hexadecimal digits of a fault.
+    /// Its name, the end of a figure's; [`CODE`] stands for four hexadecimal digits of a fault.
     pub name: &'static str,
     /// The unit in which people read it.
     pub unit: Unit,
@@ -41,6 +46,8 @@ pub enum Of {
     SlaveFault(fn(&SlaveCounts, u16) -> Option<Value>),
     /// A slave's episodes.
     Episodes(fn(&SlaveEpisodes) -> Option<Value>),
+    /// A slave's episodes, by the code of a fault.
+    EpisodesFault(fn(&SlaveEpisodes, u16) -> Option<Value>),
     /// Any station of the live list; slaves and masters have it too.
     Station(fn(&Station) -> Option<Value>),
     /// A master, where several share the token.
@@ -110,6 +117,32 @@ fn recovery(slave: &SlaveEpisodes) -> Spread {
 fn all(figures: &Figures, of: fn(&SlaveEpisodes) -> Spread) -> Spread {
     figures.episodes.slaves().iter().map(of).fold(Spread::default(), Spread::merged)
 }
+/// From a disturbance to a fault of this code.
+fn to_code(slave: &SlaveEpisodes, code: u16) -> Spread {
+    slave.to_harm.get(&Harm::Fault(code)).copied().unwrap_or_default()
+}
+/// The same of all slaves.
+fn all_to_code(figures: &Figures, code: u16) -> Spread {
+    figures.episodes.slaves().iter().map(|slave| to_code(slave, code)).fold(Spread::default(), Spread::merged)
+}
+/// What this share of the times of these kinds, of all slaves, does not exceed.
+fn percentile(times: &BTreeMap<Harm, Times>, is: impl Fn(&Harm) -> bool, percent: f64) -> Option<Value> {
+    let mut histograms = times.iter().filter(|(harm, _)| is(harm)).map(|(_, times)| times.histogram());
+    let first = histograms.next()?;
+    let Some(second) = histograms.next() else { return span(first.percentile(percent)) };
+    let mut all = first.clone();
+    [second].into_iter().chain(histograms).for_each(|more| all.merge(more));
+    span(all.percentile(percent))
+}
+fn fault_percentile(figures: &Figures, percent: f64) -> Option<Value> {
+    percentile(figures.episodes.to_harm(), |harm| matches!(harm, Harm::Fault(_)), percent)
+}
+fn code_percentile(figures: &Figures, code: u16, percent: f64) -> Option<Value> {
+    percentile(figures.episodes.to_harm(), |harm| *harm == Harm::Fault(code), percent)
+}
+fn recovery_percentile(figures: &Figures, percent: f64) -> Option<Value> {
+    percentile(figures.episodes.recovery(), |_| true, percent)
+}
 /// The one family that can be below zero: T_DP minus the longest T_DX.
 pub(super) const LEFT: &str = "left_after_t_dx";
 fn left(figures: &Figures) -> Option<Value> {
@@ -162,10 +195,23 @@ pub const FAMILIES: &[Family] = &[
     Family { name: "time_to_fault.count", unit: Unit::Count, what: "how many times from a disturbance to a fault there are, all slaves", source: "Model: episodes", of: Of::Network(|f| count(all(f, to_fault).count)) },
     Family { name: "time_to_fault.min", unit: Unit::Ms, what: "shortest of the times from a disturbance to a fault, all slaves", source: "Model: episodes", of: Of::Network(|f| span(all(f, to_fault).min())) },
     Family { name: "time_to_fault.mean", unit: Unit::Ms, what: "mean of the times from a disturbance to a fault, to the tick below, all slaves", source: "Model: episodes", of: Of::Network(|f| span(all(f, to_fault).mean())) },
+    Family { name: "time_to_fault.p50", unit: Unit::Ms, what: "what 50 % of the times from a disturbance to a fault do not exceed, three significant digits, all slaves", source: "Model: episodes", of: Of::Network(|f| fault_percentile(f, 50.0)) },
+    Family { name: "time_to_fault.p90", unit: Unit::Ms, what: "what 90 % of them do not exceed", source: "Model: episodes", of: Of::Network(|f| fault_percentile(f, 90.0)) },
+    Family { name: "time_to_fault.p99", unit: Unit::Ms, what: "what 99 % of them do not exceed", source: "Model: episodes", of: Of::Network(|f| fault_percentile(f, 99.0)) },
     Family { name: "time_to_fault.max", unit: Unit::Ms, what: "longest of the times from a disturbance to a fault, all slaves", source: "Model: episodes", of: Of::Network(|f| span(all(f, to_fault).max())) },
+    Family { name: "time_to_fault.<code>.count", unit: Unit::Count, what: "how many times from a disturbance to a fault with this code there are, all slaves", source: "Model: episodes", of: Of::NetworkFault(|f, code| count(all_to_code(f, code).count)) },
+    Family { name: "time_to_fault.<code>.min", unit: Unit::Ms, what: "shortest of them", source: "Model: episodes", of: Of::NetworkFault(|f, code| span(all_to_code(f, code).min())) },
+    Family { name: "time_to_fault.<code>.mean", unit: Unit::Ms, what: "mean of them, to the tick below", source: "Model: episodes", of: Of::NetworkFault(|f, code| span(all_to_code(f, code).mean())) },
+    Family { name: "time_to_fault.<code>.p50", unit: Unit::Ms, what: "what 50 % of them do not exceed, three significant digits", source: "Model: episodes", of: Of::NetworkFault(|f, code| code_percentile(f, code, 50.0)) },
+    Family { name: "time_to_fault.<code>.p90", unit: Unit::Ms, what: "what 90 % of them do not exceed", source: "Model: episodes", of: Of::NetworkFault(|f, code| code_percentile(f, code, 90.0)) },
+    Family { name: "time_to_fault.<code>.p99", unit: Unit::Ms, what: "what 99 % of them do not exceed", source: "Model: episodes", of: Of::NetworkFault(|f, code| code_percentile(f, code, 99.0)) },
+    Family { name: "time_to_fault.<code>.max", unit: Unit::Ms, what: "longest of them", source: "Model: episodes", of: Of::NetworkFault(|f, code| span(all_to_code(f, code).max())) },
     Family { name: "recovery.count", unit: Unit::Count, what: "how many times from the end of full operation to the next there are, all slaves", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| count(all(f, recovery).count)) },
     Family { name: "recovery.min", unit: Unit::Ms, what: "shortest of the times from the end of full operation to the next, all slaves", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| span(all(f, recovery).min())) },
     Family { name: "recovery.mean", unit: Unit::Ms, what: "mean of the times from the end of full operation to the next, to the tick below, all slaves", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| span(all(f, recovery).mean())) },
+    Family { name: "recovery.p50", unit: Unit::Ms, what: "what 50 % of the times from the end of full operation to the next do not exceed, three significant digits, all slaves", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| recovery_percentile(f, 50.0)) },
+    Family { name: "recovery.p90", unit: Unit::Ms, what: "what 90 % of them do not exceed", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| recovery_percentile(f, 90.0)) },
+    Family { name: "recovery.p99", unit: Unit::Ms, what: "what 99 % of them do not exceed", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| recovery_percentile(f, 99.0)) },
     Family { name: "recovery.max", unit: Unit::Ms, what: "longest of the times from the end of full operation to the next, all slaves", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| span(all(f, recovery).max())) },
     Family { name: "losses", unit: Unit::Count, what: "how often slaves lost full operation", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| count(f.episodes.slaves().iter().map(|slave| slave.losses).sum())) },
     Family { name: "unrecovered", unit: Unit::Count, what: "slaves that lost full operation and are without it at the end", source: "manual 2.1.5, Model: episodes", of: Of::Network(|f| count(f.episodes.slaves().iter().filter(|slave| slave.lasting.is_some()).count() as u64)) },
@@ -197,6 +243,10 @@ pub const FAMILIES: &[Family] = &[
     Family { name: "time_to_fault.min", unit: Unit::Ms, what: "shortest of the times from a disturbance to a fault", source: "Model: episodes", of: Of::Episodes(|s| span(to_fault(s).min())) },
     Family { name: "time_to_fault.mean", unit: Unit::Ms, what: "mean of the times from a disturbance to a fault, to the tick below", source: "Model: episodes", of: Of::Episodes(|s| span(to_fault(s).mean())) },
     Family { name: "time_to_fault.max", unit: Unit::Ms, what: "longest of the times from a disturbance to a fault", source: "Model: episodes", of: Of::Episodes(|s| span(to_fault(s).max())) },
+    Family { name: "time_to_fault.<code>.count", unit: Unit::Count, what: "how many times from a disturbance to a fault with this code there are", source: "Model: episodes", of: Of::EpisodesFault(|s, code| count(to_code(s, code).count)) },
+    Family { name: "time_to_fault.<code>.min", unit: Unit::Ms, what: "shortest of them", source: "Model: episodes", of: Of::EpisodesFault(|s, code| span(to_code(s, code).min())) },
+    Family { name: "time_to_fault.<code>.mean", unit: Unit::Ms, what: "mean of them, to the tick below", source: "Model: episodes", of: Of::EpisodesFault(|s, code| span(to_code(s, code).mean())) },
+    Family { name: "time_to_fault.<code>.max", unit: Unit::Ms, what: "longest of them", source: "Model: episodes", of: Of::EpisodesFault(|s, code| span(to_code(s, code).max())) },
     Family { name: "recovery.count", unit: Unit::Count, what: "how many times from the end of full operation to the next there are", source: "manual 2.1.5, Model: episodes", of: Of::Episodes(|s| count(recovery(s).count)) },
     Family { name: "recovery.min", unit: Unit::Ms, what: "shortest of the times from the end of full operation to the next", source: "manual 2.1.5, Model: episodes", of: Of::Episodes(|s| span(recovery(s).min())) },
     Family { name: "recovery.mean", unit: Unit::Ms, what: "mean of the times from the end of full operation to the next, to the tick below", source: "manual 2.1.5, Model: episodes", of: Of::Episodes(|s| span(recovery(s).mean())) },

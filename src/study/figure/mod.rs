@@ -157,14 +157,14 @@ impl Figures {
     /// What is counted of a subject; `code` is that of a fault where the family asks for one.
     fn counted(&self, family: &Family, subject: Subject, code: u16) -> Option<Value> {
         let slave = |address| self.counts.slaves.get(self.layout().slave(address)?);
+        let episodes = |address| self.episodes.slaves().iter().find(|slave| slave.address == address);
         match (family.of, subject) {
             (family::Of::Network(of), Subject::Network) => of(self),
             (family::Of::NetworkFault(of), Subject::Network) => of(self, code),
             (family::Of::Slave(of), Subject::Slave(address)) => of(slave(address)?),
             (family::Of::SlaveFault(of), Subject::Slave(address)) => of(slave(address)?, code),
-            (family::Of::Episodes(of), Subject::Slave(address)) => {
-                of(self.episodes.slaves().iter().find(|slave| slave.address == address)?)
-            }
+            (family::Of::Episodes(of), Subject::Slave(address)) => of(episodes(address)?),
+            (family::Of::EpisodesFault(of), Subject::Slave(address)) => of(episodes(address)?, code),
             (
                 family::Of::Station(of),
                 Subject::Slave(address) | Subject::Master(address) | Subject::Station(address),

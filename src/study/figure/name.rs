@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::family::{self, FAMILIES, Family};
+use super::family::{self, CODE, FAMILIES, Family};
 use super::statistic::{Of, STATISTICS};
 use super::steady::{self, STEADY};
 use super::value::Unit;
@@ -83,7 +83,10 @@ impl Scope {
     fn has(self, of: family::Of) -> bool {
         match of {
             family::Of::Network(_) | family::Of::NetworkFault(_) => self == Self::Network,
-            family::Of::Slave(_) | family::Of::SlaveFault(_) | family::Of::Episodes(_) => self == Self::Slave,
+            family::Of::Slave(_)
+            | family::Of::SlaveFault(_)
+            | family::Of::Episodes(_)
+            | family::Of::EpisodesFault(_) => self == Self::Slave,
             family::Of::Station(_) => matches!(self, Self::Station | Self::Slave | Self::Master),
             family::Of::Master(_) => self == Self::Master,
             family::Of::Link(_) => self == Self::Link,
@@ -104,8 +107,10 @@ impl Scope {
     }
     /// The ends of all listed names of this kind: families, each code of a fault, then the statistics of quantities.
     fn ends(self) -> impl Iterator<Item = String> {
-        let families = self.families().flat_map(|family| match family.name.strip_suffix("<code>") {
-            Some(stem) => SensorFault::ALL.iter().map(|fault| format!("{stem}{:04X}", fault.code())).collect(),
+        let families = self.families().flat_map(|family| match family.name.split_once(CODE) {
+            Some((stem, tail)) => {
+                SensorFault::ALL.iter().map(|fault| format!("{stem}{:04X}{tail}", fault.code())).collect()
+            }
             None => vec![family.name.to_owned()],
         });
         let quantities = || self.quantities().map(|quantity| quantity.name);
@@ -411,8 +416,8 @@ fn what(scope: Scope, end: &str) -> Option<What> {
         return Some(What::Family(family));
     }
     let by_code = |family: &&Family| {
-        let stem = family.name.strip_suffix("<code>")?;
-        let digits = end.strip_prefix(stem)?;
+        let (stem, tail) = family.name.split_once(CODE)?;
+        let digits = end.strip_prefix(stem)?.strip_suffix(tail)?;
         let good = digits.len() == 4 && digits.bytes().all(|octet| octet.is_ascii_hexdigit());
         u16::from_str_radix(digits, 16).ok().filter(|_| good)
     };

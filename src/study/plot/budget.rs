@@ -35,7 +35,19 @@ const GAP: i32 = 16;
 /// Of a part, how strongly that is drawn which the loop adds.
 const ADDED: f64 = 0.45;
 
-const COLOURS: [RGBColor; 5] = [BLUE, ORANGE, PURPLE, GREEN, SKY];
+/// Of the sources, one after the other: as many as there can be.
+const COLOURS: [RGBColor; 10] = [
+    BLUE,
+    ORANGE,
+    PURPLE,
+    GREEN,
+    SKY,
+    RGBColor(0x8B, 0x5A, 0x2B),
+    RGBColor(0xF0, 0xE4, 0x42),
+    RGBColor(0x44, 0x3A, 0x8C),
+    RGBColor(0x9A, 0x8B, 0x00),
+    RGBColor(0xD9, 0xBF, 0x9C),
+];
 /// What is left of the window.
 const LEFT: RGBColor = RGBColor(0xBF, 0xE3, 0xD0);
 
@@ -272,5 +284,73 @@ fn bars(canvas: &mut Canvas<'_>, area: Area, of: (&Budget, &[(&SlaveBudget, &Sla
         canvas.path(&[(b, lane.top), (b, lane.bottom)], VERMILION, 2);
         let text = format!("{} ns, {} ns left", number(whole), number(window - whole));
         canvas.text((right + 10, lane.centre().1), &text, Font::new(lanes.letters()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::profile::find;
+    use crate::study::budget::Shares;
+    use crate::study::budget::source::SOURCES;
+    use crate::study::plot::tests::all_inside_and_apart;
+    use crate::study::scenario::tests::network;
+    use crate::time::BitRate;
+    use crate::wire::Address;
+
+    /// A budget of so many encoders and sources, the encoder in the middle without shares where `gap` says so. Every
+    /// third part is below zero, and of every fourth encoder e left the window.
+    fn invented(slaves: usize, sources: usize, gap: bool) -> Budget {
+        let shares = |index: usize, part: i64| {
+            let sign = |source: usize| if source % 3 == 2 { -1 } else { 1 };
+            let parts: Vec<_> = (0..sources).map(|n| Span::from_ns(part * sign(n) * (1 + (n as i64) % 4))).collect();
+            let (rest, interaction) = (Span::from_ns(20), Span::from_ns(-35));
+            let far = if index % 4 == 3 { Span::from_us(1) } else { Span::ZERO };
+            Shares {
+                whole: rest + far + interaction + parts.iter().copied().sum(),
+                rest: rest + far,
+                parts,
+                interaction,
+            }
+        };
+        let slave = |index: usize| SlaveBudget {
+            address: Address::new(index as u8 + 3).unwrap(),
+            device: "posital-ocd-dpb1b".to_owned(),
+            window: Span::from_us(1),
+            cycles: 1_234_567,
+            shares: (!gap || index != slaves / 2).then(|| SlaveShares {
+                worst: shares(index, 120),
+                p99_9: shares(index, 90),
+                direct: shares(index, 70),
+            }),
+        };
+        Budget {
+            scenario: "invented".to_owned(),
+            seed: 42,
+            sources: SOURCES[..sources].iter().collect(),
+            runs: 2 * sources + 2,
+            slaves: (0..slaves).map(slave).collect(),
+        }
+    }
+
+    /// No source, one and all of them; one encoder, as many as are drawn in full, and as many as a bus can have.
+    #[test]
+    fn everything_is_inside_and_no_two_texts_meet() {
+        assert!(SOURCES.len() <= COLOURS.len(), "two sources would look alike");
+        let scenario = network(BitRate::M12, find("posital-ocd-dpb1b").unwrap(), 1);
+        for sources in [0, 1, 4, SOURCES.len()] {
+            for (slaves, gap) in [(1, false), (FULL, false), (FULL + 2, true), (122, true)] {
+                let budget = invented(slaves, sources, gap);
+                let text = draw(&scenario, &budget).unwrap();
+                all_inside_and_apart(&format!("{slaves} encoders, {sources} sources"), &text);
+                for title in budget.sources.iter().map(|source| source.title) {
+                    assert!(text.matches(title).count() > 1, "{title} in the legend and beside its bar");
+                }
+                assert_eq!(text.contains("All encoders"), slaves > FULL);
+            }
+        }
+        let none = draw(&scenario, &invented(1, 2, true)).unwrap();
+        all_inside_and_apart("no shares", &none);
+        assert!(none.contains("there is nothing to share out"), "{none}");
     }
 }

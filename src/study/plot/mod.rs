@@ -60,6 +60,11 @@ const PLOTS: &[Plot] = &[
     Plot { file: "recovery.svg", when: |material| !material.distributions.episodes.is_empty(), draw: recovery::draw },
 ];
 
+/// The names that the pictures of a run can have.
+pub fn files() -> impl Iterator<Item = &'static str> {
+    PLOTS.iter().map(|plot| plot.file)
+}
+
 const fn always(_: &Material<'_>) -> bool {
     true
 }

@@ -8,6 +8,7 @@ use super::journal::Journal;
 use super::plan::{Base, Plan};
 use super::shard::Shard;
 use super::summary::Never;
+use crate::study::report::number;
 
 /// What a cycle of a slave costs, figures included (ns). Measured on one core of a server of 2021; it is an estimate
 /// before the first run, and nothing depends on it.
@@ -31,8 +32,9 @@ impl Concluded {
             let (all, confidence) = (plan.combinations_to_run(), plan.definition.confidence);
             let _ = writeln!(
                 text,
-                "{figure}: 0 in every run of {combinations} of {all} combinations; {runs} runs tell, at {confidence}, that fewer \
-                 than {:.2} % have one (rule of three)",
+                "{figure}: 0 in every run of {combinations} of {all} combinations; {} of each leave it possible, at \
+                 {confidence}, that up to {:.2} % have one (rule of three)",
+                number(*runs, "run"),
                 bound * 100.0
             );
         }

@@ -11,6 +11,7 @@ use crate::sim::queue::Queue;
 use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::study::build;
 use crate::study::difference::{End, is_synch};
+use crate::study::event_budget::EventBudget;
 use crate::study::replay::ReplayError;
 use crate::study::scenario::Scenario;
 use crate::time::Time;
@@ -58,16 +59,18 @@ pub(super) struct Fork<Q> {
     pub(super) begin: Time,
 }
 
-/// The network of `scenario` as it is before `cycle`; `recorder` has seen everything until then.
+/// The network of `scenario` as it is before `cycle`, with paths on which what `altered` disturbs can act too; `recorder` has
+/// seen everything until then.
 ///
 /// # Errors
-/// The run has no such cycle.
+/// The run has no such cycle, or makes no headway.
 pub(super) fn fork<Q: Queue<NetworkEvent> + Clone, R: Recorder>(
-    scenario: &Scenario,
+    [scenario, altered]: [&Scenario; 2],
     cycle: u64,
     recorder: &mut R,
 ) -> Result<Fork<Q>, ReplayError> {
-    let mut network: Network<Node, Q> = build::network(scenario);
+    let mut network: Network<Node, Q> = build::network_beside(scenario, altered);
+    let mut headway = EventBudget::of(scenario).headway(&network, scenario);
     let end = End::of(scenario);
     let at = end.at.unwrap_or(Time::MAX);
     let over = |network: &Network<Node, Q>| end.cycle.is_some_and(|last| network.cycles() > last);
@@ -80,6 +83,7 @@ pub(super) fn fork<Q: Queue<NetworkEvent> + Clone, R: Recorder>(
         if over(&network) || network.run(Until::Time(at), 1, recorder) {
             return Err(too_late(&network));
         }
+        headway.check(1, &mut network, recorder)?;
     }
     let mut probe = network.clone();
     let mut scout = Scout { master: scenario.master.address, sent: None, begun: None };
@@ -88,6 +92,7 @@ pub(super) fn fork<Q: Queue<NetworkEvent> + Clone, R: Recorder>(
         if over(&probe) || probe.run(Until::Time(at), 1, &mut scout) {
             return Err(too_late(&probe));
         }
+        headway.check(1, &mut probe, &mut scout)?;
         if let Some(sent) = scout.sent.take() {
             last = Some((events, sent));
         }

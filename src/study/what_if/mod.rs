@@ -9,8 +9,10 @@ mod rider;
 mod world;
 
 use super::difference::{Differences, End, Race, Runner};
+use super::event_budget::EventBudget;
 use super::replay::ReplayError;
 use super::scenario::Scenario;
+use crate::sim::cut::Cuts;
 use crate::sim::network::NetworkEvent;
 use crate::sim::queue::Queue;
 use crate::sim::record::Recorder;
@@ -32,6 +34,12 @@ pub enum WhatIfError {
         /// Which overrides.
         keys: String,
     },
+    /// Cables are cut at more places than a network can tell apart.
+    #[error(
+        "too many cuts\n  rule: at most {max} places in both futures together (Model)\n  help: fewer cuts, or --run-set instead of --set",
+        max = Cuts::MAX
+    )]
+    Cuts,
     /// An order that would have come before.
     #[error(
         "an event before cycle {cycle} is not the same: what has happened cannot change\n  help: give it an instant after the beginning of cycle {cycle}"
@@ -57,7 +65,7 @@ pub struct Futures<R> {
 /// the end of the run. `alter` is told of the rider of the other future before it goes on.
 ///
 /// # Errors
-/// The run has no such cycle, or a network that runs cannot become `altered`.
+/// The run has no such cycle or makes no headway, or a network that runs cannot become `altered`.
 ///
 /// # Panics
 /// If a scenario breaks a rule that reading it checks.
@@ -70,7 +78,10 @@ pub fn futures<Q: Queue<NetworkEvent> + Clone, R: Recorder + Clone>(
     if !world::can_change(original, altered) {
         return Err(WhatIfError::Station { keys: String::new() });
     }
-    let fork = fork::fork::<Q, R>(original, cycle, &mut rider)?;
+    if !world::has_room(original, altered) {
+        return Err(WhatIfError::Cuts);
+    }
+    let fork = fork::fork::<Q, R>([original, altered], cycle, &mut rider)?;
     let from = fork.begin;
     if !world::same_past(original, altered, from, cycle) {
         return Err(WhatIfError::Past { cycle });
@@ -82,13 +93,16 @@ pub fn futures<Q: Queue<NetworkEvent> + Clone, R: Recorder + Clone>(
         end = end.or_cycle(cycle.saturating_add(window));
     }
     let before = cycle.checked_sub(1);
-    let runner = |network, rider| Runner { network, master: original.master.address, cycle: before, end, rider };
+    let runner = |network, scenario: &Scenario, rider| {
+        let guard = Some(EventBudget::of(scenario).headway(&network, scenario));
+        Runner { network, master: original.master.address, cycle: before, end, guard, rider }
+    };
     let mut beside = rider.clone();
     alter(&mut beside);
-    let runners = [runner(fork.network, rider), runner(other, beside)];
+    let runners = [runner(fork.network, original, rider), runner(other, altered, beside)];
     let mut race = Race::of(runners, original.master.t_dp);
     race.advance(from - Span::from_ticks(1));
     world::change_rest(race.begin(cycle), [original, altered], cycle);
-    let (differences, ends) = race.run();
+    let (differences, ends) = race.run_guarded().map_err(ReplayError::from)?;
     Ok(Futures { from, differences, ends })
 }

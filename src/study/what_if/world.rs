@@ -12,11 +12,12 @@
 //! ```
 
 use crate::device::node::Node;
+use crate::sim::cut::Cuts;
 use crate::sim::motion::Shaft;
 use crate::sim::network::{Network, NetworkEvent};
 use crate::sim::queue::Queue;
 use crate::study::build;
-use crate::study::scenario::{Disturbance, Event, Scenario, What, When};
+use crate::study::scenario::{Event, Scenario, When};
 use crate::time::Time;
 
 /// The keys that can change, for messages.
@@ -46,18 +47,14 @@ fn in_the_old_world(original: &Scenario, altered: &Scenario) -> Scenario {
     other
 }
 
-/// Whether a network of `original` that runs can become one of `altered`.
+/// Whether a network of `original` that runs can become one of `altered`. Its paths must know the disturbances of both
+/// from the start ([`build::network_beside`]).
 pub(super) fn can_change(original: &Scenario, altered: &Scenario) -> bool {
-    // What a repeater may add, and where a cable may be cut, is part of the paths.
-    let paths = |scenario: &Scenario| -> Vec<Disturbance> {
-        scenario
-            .disturbances
-            .iter()
-            .filter(|disturbance| matches!(disturbance.what, What::Repeater(..) | What::Cut(_)))
-            .cloned()
-            .collect()
-    };
-    in_the_old_world(original, altered) == *original && paths(altered) == paths(original)
+    in_the_old_world(original, altered) == *original
+}
+/// Whether the paths have room for the cuts of both.
+pub(super) fn has_room(original: &Scenario, altered: &Scenario) -> bool {
+    build::cuts_beside(original, altered).len() <= Cuts::MAX
 }
 
 /// Those of `events` that have not come at `now`, before `cycle` begins.
