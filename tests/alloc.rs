@@ -13,9 +13,11 @@ use isodp::study::build;
 use isodp::study::flight::FlightRecorder;
 use isodp::study::histogram::Histograms;
 use isodp::study::metric::Metrics;
+use isodp::study::row::{CycleRow, LinkRow, Sink, SlaveRow};
 use isodp::study::run;
 use isodp::study::scenario::disturbance::DISTURBANCES;
 use isodp::study::scenario::{Flight, Scenario};
+use isodp::study::steady::SteadyState;
 
 /// Cycles until everything is locked, linked and polled once: queues and buffers have their final size.
 const START: u64 = 1_000;
@@ -189,6 +191,42 @@ fn a_slave_that_starts_anew_allocates_for_its_parameters_alone() {
         let count = allocations::<NearQueue<NetworkEvent>>(&disturbed);
         assert!(count <= *starts, "{count} allocations for {starts} starts: {keys}");
     }
+}
+
+/// Rows as a run of figures takes them.
+struct Kept {
+    steady: SteadyState,
+    histograms: Histograms,
+}
+impl Sink for Kept {
+    fn cycle(&mut self, row: &CycleRow) {
+        self.steady.cycle(row, &self.histograms);
+        self.histograms.cycle(row);
+    }
+    fn slave(&mut self, row: &SlaveRow) {
+        self.histograms.slave(row);
+        self.steady.slave(row);
+    }
+    fn link(&mut self, row: &LinkRow) {
+        self.histograms.link(row);
+    }
+}
+
+/// What the histograms hold when it begins takes room; its batches do not.
+#[test]
+fn a_steady_state_allocates_nothing() {
+    let scenario = reference(&[]);
+    let layout = run::layout(&scenario);
+    let steady = SteadyState::new(&layout, |_| true).expect("slaves with a clock");
+    let kept = Kept { steady, histograms: Histograms::new(&layout) };
+    let mut metrics = Metrics::new(layout, |_, _| 0.0, kept);
+    let mut network: Network<Node, NearQueue<NetworkEvent>> = build::network(&scenario);
+    assert!(network.run(Until::Cycle(START), u64::MAX, &mut metrics));
+    let info = allocation_counter::measure(|| {
+        assert!(network.run(Until::Cycle(START + WATCHED), u64::MAX, &mut metrics));
+    });
+    assert_eq!(info.count_total, 0);
+    assert!(metrics.sink().steady.begin().is_some_and(|begin| begin.cycle < START && begin.cycles > WATCHED));
 }
 
 /// The stretches that it keeps take room; the cycles that come and go do not.

@@ -23,6 +23,7 @@ use crate::support::{Run, address, scenario};
 /// Every shipped scenario with its test.
 const TESTS: &[(&str, fn())] = &[
     ("fast-cycle", fast_cycle),
+    ("frame-loss", frame_loss),
     ("full-segment", full_segment),
     ("gc-jitter", gc_jitter),
     ("gc-jitter-outside", gc_jitter_outside),
@@ -344,6 +345,31 @@ fn only(run: &Run, slave: u8) -> Run {
         events: run.events_of(slave).copied().collect(),
         ..Run::default()
     }
+}
+
+/// One lost request in a hundred, by chance: the failure counter is the chain that the losses make of it.
+#[test]
+fn frame_loss() {
+    let network = scenario("frame-loss", &[]);
+    let run = Run::of(&network);
+    let lost = |cycle| {
+        run.events.iter().any(|event| event.cycle == cycle && matches!(event.what, Observation::Disturbed { .. }))
+    };
+    let (mut counter, mut cycle) = (0_u16, 400);
+    while counter <= 10 {
+        counter = if lost(cycle) { counter + 10 } else { counter.saturating_sub(1) };
+        assert_eq!(run.row(3, cycle).life_counter, counter, "cycle {cycle}");
+        cycle += 1;
+    }
+    let tripped = cycle - 1;
+    assert_eq!(run.faults_of(3), [(tripped, 0x0F02)]);
+    let (all, rounds) = ((400..2_400).filter(|&cycle| lost(cycle)).count(), run.phases_of(3).len() / 3);
+    assert!(all > 2 * rounds, "single losses are forgiven: {all} losses, {rounds} times into operation");
+    // It synchronises again, and a further loss in between costs it another round.
+    let back =
+        run.phases_of(3).iter().find(|&&(phase, at)| phase == Phase::Operation && at > tripped).map(|last| last.1);
+    assert!(back.is_some_and(|back| back >= tripped + 32), "{back:?}");
+    assert!(run.slave(3).filter(|row| row.cycle >= 150).all(|row| row.pll == PllState::Locked));
 }
 
 /// Requests to slave 3 are lost in cycle 200 and in cycles 300 and 301; the master stops counting for slave 4 in cycles

@@ -8,10 +8,8 @@ use std::convert::Infallible;
 use isodp::sim::noise::{Purpose, Stream};
 use isodp::study::statistics::aggregate::{Aggregate, Place, RunKey};
 use isodp::study::statistics::batch_means::BatchMeans;
-use isodp::study::statistics::bins::Bins;
 use isodp::study::statistics::bisection::{Answer, Search, Steps};
 use isodp::study::statistics::confidence::Confidence;
-use isodp::study::statistics::keyed::Keyed;
 use isodp::study::statistics::probability::Probability;
 use isodp::study::statistics::quantile;
 use isodp::study::statistics::sequential::{SequentialSettings, SequentialTest, Verdict};
@@ -242,17 +240,15 @@ fn values() -> impl Strategy<Value = Vec<(i64, u8, u8)>> {
     let value = prop_oneof![3 => -50..50i64, 2 => any::<i64>(), 1 => Just(i64::MIN), 1 => Just(i64::MAX)];
     prop::collection::vec((value, 0..4u8, 0..4u8), 0..40)
 }
-fn of(values: &[(i64, u8, u8)]) -> (Aggregate, Bins) {
-    let (mut all, mut bins) = (Aggregate::default(), Bins::default());
+fn of(values: &[(i64, u8, u8)]) -> Aggregate {
+    let mut all = Aggregate::default();
     for &(value, run, cycle) in values {
         all.add(value, Place { run: RunKey(run.into()), cycle: cycle.into() });
-        bins.add(value);
     }
-    (all, bins)
+    all
 }
-fn merged(mut a: (Aggregate, Bins), b: &(Aggregate, Bins)) -> (Aggregate, Bins) {
-    a.0.merge(&b.0);
-    a.1.merge(&b.1);
+fn merged(mut a: Aggregate, b: &Aggregate) -> Aggregate {
+    a.merge(b);
     a
 }
 
@@ -263,21 +259,21 @@ proptest! {
     fn merges_are_associative_and_commutative(a in values(), b in values(), c in values()) {
         let together = of(&[&a[..], &b, &c].concat());
         let [a, b, c] = [of(&a), of(&b), of(&c)];
-        let left = merged(merged(a.clone(), &b), &c);
-        let right = merged(a.clone(), &merged(b.clone(), &c));
+        let left = merged(merged(a, &b), &c);
+        let right = merged(a, &merged(b, &c));
         let turned = merged(merged(c, &b), &a);
         prop_assert_eq!(&left, &together);
         prop_assert_eq!(&right, &together);
         prop_assert_eq!(&turned, &together);
-        let variance = |all: &(Aggregate, Bins)| all.0.variance().map(f64::to_bits);
+        let variance = |all: &Aggregate| all.variance().map(f64::to_bits);
         prop_assert_eq!(variance(&turned), variance(&together));
     }
 
     #[test]
     fn texts_are_read_back_to_the_same_bits(a in values()) {
-        let (all, bins) = of(&a);
-        let json = serde_json::to_string(&(all, &bins)).unwrap();
-        prop_assert_eq!(serde_json::from_str::<(Aggregate, Bins)>(&json).unwrap(), (all, bins));
+        let all = of(&a);
+        let json = serde_json::to_string(&all).unwrap();
+        prop_assert_eq!(serde_json::from_str::<Aggregate>(&json).unwrap(), all);
     }
 
     #[test]
@@ -290,34 +286,5 @@ proptest! {
         prop_assert!((all.variance().unwrap() - squares / (count - 1.0)).abs() <= 1e-9 * (1.0 + squares));
         prop_assert_eq!(all.min().map(|min| min.value), a.iter().min().copied());
         prop_assert_eq!(all.max().map(|max| max.value), a.iter().max().copied());
-    }
-
-    #[test]
-    fn parts_that_arrive_twice_count_once(
-        parts in prop::collection::vec(values(), 1..8),
-        shares in prop::collection::vec(prop::collection::vec(any::<prop::sample::Index>(), 0..8), 3),
-    ) {
-        let share = |which: &Vec<prop::sample::Index>| {
-            let mut share = Keyed::default();
-            for number in which.iter().map(|index| index.index(parts.len())) {
-                share.insert(RunKey(number as u128), of(&parts[number]).0).unwrap();
-            }
-            share
-        };
-        let [a, b, c] = [share(&shares[0]), share(&shares[1]), share(&shares[2])];
-        let join = |of: [&Keyed<RunKey, Aggregate>; 3]| {
-            let mut all = Keyed::default();
-            for share in of {
-                all.merge(share).unwrap();
-            }
-            all
-        };
-        let once = join([&a, &b, &c]);
-        prop_assert_eq!(&join([&c, &a, &b]), &once);
-        let mut twice = once.clone();
-        twice.merge(&once).unwrap();
-        twice.merge(&a).unwrap();
-        prop_assert_eq!(&twice, &once);
-        prop_assert_eq!(twice.total(), once.total());
     }
 }

@@ -97,6 +97,10 @@ impl Histogram {
         self.sum += other.sum;
     }
 
+    /// The sum of all values, exact \[ticks\].
+    pub(in crate::study) const fn sum(&self) -> i128 {
+        self.sum
+    }
     /// How many values were recorded, those out of range included.
     pub fn count(&self) -> u64 {
         self.negative_count() + self.positive.len() + self.below + self.above
@@ -419,6 +423,17 @@ impl Histograms {
                 named(&self.link, name)?.get(self.layout.link(publisher, subscriber)?)
             }
         }
+    }
+    /// Every histogram, in a fixed order. Allocates nothing.
+    pub(in crate::study) fn all(&self) -> impl Iterator<Item = &Histogram> {
+        let network = self.network.iter().flat_map(|recorded| &recorded.subjects);
+        let slave = self.slave.iter().flat_map(|recorded| &recorded.subjects);
+        network.chain(slave).chain(self.link.iter().flat_map(|recorded| &recorded.subjects))
+    }
+    /// Which one of [`Self::all`] the histogram of the quantity `name` of `subject` is.
+    pub(in crate::study) fn place(&self, name: &str, subject: Subject) -> Option<usize> {
+        let wanted = self.get(name, subject)?;
+        self.all().position(|histogram| std::ptr::eq(histogram, wanted))
     }
     /// Everything, by quantity as in [`QUANTITIES`], then by subject.
     pub fn iter(&self) -> impl Iterator<Item = (&'static Quantity, Subject, &Histogram)> {

@@ -35,6 +35,7 @@ pub mod run;
 mod sample;
 pub mod scenario;
 pub mod statistics;
+pub mod steady;
 pub mod summary;
 pub mod sweep;
 mod tally;

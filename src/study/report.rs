@@ -30,6 +30,7 @@ pub fn render(summary: &Summary, dir: Option<&str>) -> String {
     episodes(summary, &mut lines);
     live_list(summary, &mut lines);
     spread(summary, &mut lines);
+    steady_state(summary, &mut lines);
     links(summary, &mut lines);
     acyclic(summary, &mut lines);
     faults(summary, &mut lines);
@@ -266,6 +267,14 @@ fn spread(summary: &Summary, lines: &mut Vec<String>) {
         span(skew.p99_9),
         span(skew.max),
     ));
+}
+
+/// From when on the network is at work, and what is known of it then.
+fn steady_state(summary: &Summary, lines: &mut Vec<String>) {
+    if let Some(steady) = &summary.steady_state {
+        lines.push(String::new());
+        lines.extend(steady.lines());
+    }
 }
 
 fn links(summary: &Summary, lines: &mut Vec<String>) {

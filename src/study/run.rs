@@ -20,6 +20,7 @@ use super::plot::{
 };
 use super::row::Sink;
 use super::scenario::{Extent, Scenario};
+use super::steady::{SteadyState, SteadySummary};
 use super::summary::{Facts, SlaveFacts, Summary};
 use super::topology::Map;
 use super::verdict;
@@ -106,11 +107,16 @@ struct Sinks {
     histograms: Histograms,
     faults: FirstFaults,
     episodes: Episodes,
+    steady: Option<SteadyState>,
     exports: Option<Exports>,
     plots: Option<Plots>,
 }
 impl Sink for Sinks {
     fn cycle(&mut self, row: &super::row::CycleRow) {
+        // Before this cycle is recorded.
+        if let Some(steady) = &mut self.steady {
+            steady.cycle(row, &self.histograms);
+        }
         self.histograms.cycle(row);
         self.exports.cycle(row);
         self.plots.cycle(row);
@@ -118,6 +124,9 @@ impl Sink for Sinks {
     fn slave(&mut self, row: &super::row::SlaveRow) {
         self.histograms.slave(row);
         self.episodes.slave(row);
+        if let Some(steady) = &mut self.steady {
+            steady.slave(row);
+        }
         self.exports.slave(row);
         self.plots.slave(row);
     }
@@ -130,6 +139,9 @@ impl Sink for Sinks {
         self.histograms.event(row);
         self.faults.event(row);
         self.episodes.event(row);
+        if let Some(steady) = &mut self.steady {
+            steady.event(row);
+        }
         self.exports.event(row);
         self.plots.event(row);
     }
@@ -166,6 +178,7 @@ pub fn run<Q: Queue<NetworkEvent>>(
         histograms: Histograms::new(&layout),
         faults: FirstFaults::default(),
         episodes: episodes(scenario, &layout),
+        steady: steady_state(scenario, &layout),
         exports: exports.transpose()?,
         plots,
     };
@@ -194,7 +207,7 @@ fn conclude(
     (fingerprints, bus, flight): (&Fingerprints, Option<&BusCycle>, Option<&Recording>),
     dir: Option<PathBuf>,
 ) -> Result<Outcome, RunError> {
-    let Sinks { histograms, faults, episodes, exports, plots } = sinks;
+    let Sinks { histograms, faults, episodes, steady, exports, plots } = sinks;
     let mut digest = Digest::default();
     digest.octets(&serde_json::to_vec(&summary)?);
     let statistics = digest.value();
@@ -212,7 +225,8 @@ fn conclude(
     summary.show_faults(&faults, &scenario.invocation);
     summary.flight = flight.map(Recording::line);
     summary.show_episodes(&episodes);
-    let figures = Figures::new(counts, histograms, episodes);
+    summary.steady_state = steady.as_ref().map(|steady| SteadySummary::of(steady, &histograms));
+    let figures = Figures::new(counts, histograms, episodes).with_steady_state(steady);
     summary.verdicts = verdict::judge(&scenario.expectations, &figures);
     let map = Map::of(scenario);
     if scenario.topology.has_segments() {
@@ -278,8 +292,16 @@ pub fn layout(scenario: &Scenario) -> Layout {
 
 /// What becomes of disturbances, before any is seen.
 pub(super) fn episodes(scenario: &Scenario, layout: &Layout) -> Episodes {
-    let clocked = |slave| scenario.slave(slave).is_some_and(|slave| scenario.is_clocked(slave));
-    Episodes::new(layout, clocked)
+    Episodes::new(layout, |slave| is_clocked(scenario, slave))
+}
+
+/// What waits for the steady state; none of a network without SYNCH.
+pub(super) fn steady_state(scenario: &Scenario, layout: &Layout) -> Option<SteadyState> {
+    SteadyState::new(layout, |slave| is_clocked(scenario, slave))
+}
+
+fn is_clocked(scenario: &Scenario, slave: Address) -> bool {
+    scenario.slave(slave).is_some_and(|slave| scenario.is_clocked(slave))
 }
 
 /// Nobody where there is one only.

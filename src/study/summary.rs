@@ -12,6 +12,7 @@ use super::histogram::{Histogram, Histograms, QUANTITIES, Subject};
 use super::invocation::Invocation;
 use super::live_list::{Seen, Station};
 use super::masters::MasterSummary;
+use super::steady::SteadySummary;
 use super::trace::WINDOW;
 use super::verdict::Verdict;
 use crate::observation::Leds;
@@ -61,6 +62,10 @@ pub struct Summary {
     /// was harmed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episodes: Option<EpisodeSummary>,
+    /// From when on all slaves are locked and in operation, and what came then; none before the fingerprints are known
+    /// and of a network without SYNCH. It is made of what the hash of all figures is of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steady_state: Option<SteadySummary>,
     /// Name and text of each fingerprint.
     #[serde(serialize_with = "map")]
     pub fingerprint: Vec<(String, String)>,
@@ -475,6 +480,7 @@ impl Summary {
             first_faults: Vec::new(),
             flight: None,
             episodes: None,
+            steady_state: None,
             network: Network {
                 scenario: facts.scenario,
                 bit_rate: facts.bit_rate.text(),

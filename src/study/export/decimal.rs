@@ -79,6 +79,7 @@ units! {
     s = s of Span;
     ms = ms of Span;
     us = us of Span;
+    ns = ns of Span;
     us_or_null = us of Option<Span>;
     ns_or_null = ns of Option<Span>;
     ms_or_null = ms of Option<Span>;

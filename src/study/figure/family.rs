@@ -12,6 +12,7 @@ use crate::study::episode::{Harm, SlaveEpisodes, Spread, Times};
 use crate::study::histogram::Subject;
 use crate::study::live_list::{CycleTimes, Station};
 use crate::study::masters::MasterCounts;
+use crate::study::steady::Begin;
 use crate::time::Span;
 
 /// What stands for the code of a fault in the name of a family.
@@ -96,6 +97,9 @@ fn share(slave: &SlaveCounts) -> Option<Value> {
 fn in_phase(slave: &SlaveCounts, phase: Phase) -> Option<Value> {
     Some(Value::Span(slave.phases[phase as usize]))
 }
+fn steady(figures: &Figures, of: fn(Begin) -> Value) -> Option<Value> {
+    figures.steady_state()?.begin().map(of)
+}
 fn last_change(figures: &Figures) -> Option<Value> {
     let slaves = figures.counts.slaves.iter().map(|slave| slave.last_change);
     instant(slaves.chain([figures.counts.network.last_mode]).max().flatten())
@@ -165,6 +169,10 @@ pub const FAMILIES: &[Family] = &[
     Family { name: "resynchronisations", unit: Unit::Count, what: "how often clock recoveries locked again", source: "Model: D12", of: Of::Network(|f| sum(f, |slave| slave.resynchronisations)) },
     Family { name: "in_operation", unit: Unit::Truth, what: "whether all slaves are in cyclic operation at the end", source: "manual 2.1.5", of: Of::Network(|f| truth(f.counts.slaves.iter().all(in_operation))) },
     Family { name: "last_state_change", unit: Unit::S, what: "when a DP state, start-up phase, clock recovery or a master's mode changed last", source: "manual 2.1", of: Of::Network(last_change) },
+    Family { name: "steady_state.begin", unit: Unit::Ms, what: "when the steady state begins: every slave is locked and in cyclic operation", source: "manual 2.1, Model: D12, D16", of: Of::Network(|f| steady(f, |s| Value::Span(s.at.since_zero()))) },
+    Family { name: "steady_state.begin_cycle", unit: Unit::Count, what: "cycles before it", source: "manual 2.1, Model: D12, D16", of: Of::Network(|f| steady(f, |s| Value::Count(s.cycle))) },
+    Family { name: "steady_state.cycles", unit: Unit::Count, what: "cycles from then on", source: "manual 2.1, Model: D12, D16", of: Of::Network(|f| steady(f, |s| Value::Count(s.cycles))) },
+    Family { name: "steady_state.faults", unit: Unit::Count, what: "faults that slaves latched in these", source: "manual 5.3", of: Of::Network(|f| steady(f, |s| Value::Count(s.faults))) },
     Family { name: "retries", unit: Unit::Count, what: "requests that the master repeated", source: "Model: D7", of: Of::Network(|f| count(f.counts.network.retries)) },
     Family { name: "no_answers", unit: Unit::Count, what: "requests without answer after all retries", source: "Model: D7", of: Of::Network(|f| count(f.counts.network.no_answers)) },
     Family { name: "diagnoses", unit: Unit::Count, what: "times that slaves asked for Slave_Diag during data exchange (DH)", source: "EN 50170-2", of: Of::Network(|f| count(f.counts.network.diagnoses)) },

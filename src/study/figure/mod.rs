@@ -13,6 +13,9 @@
 //! | `slave.each.`, `link.each.`, `master.each.` | all of them, each for itself; an expectation must hold for every one |
 //! | `slave.min.`, `slave.max.` and so on | the smallest or largest of them; none as soon as one of them has none |
 //!
+//! `steady.` before a quantity means its values in steady state alone, and they have bounds: `steady.latch_skew.mean_low`,
+//! `slave.3.steady.pll_error.magnitude_p99_high` ([`STEADY`]).
+//!
 //! Then comes a family ([`FAMILIES`]), `lock_time`, `faults`, `faults.0F04`, or a recorded quantity
 //! ([`QUANTITIES`](super::histogram::QUANTITIES)) and a statistic ([`STATISTICS`]): `latch_skew.p99`,
 //! `slave.each.pll_error.magnitude_p99`. A new quantity, statistic or family is a line of its table and has its names
@@ -28,11 +31,13 @@ pub mod family;
 mod name;
 pub mod page;
 pub mod statistic;
+pub mod steady;
 pub mod value;
 
 pub use family::{FAMILIES, Family};
 pub use name::{Figure, FigureError, Scope, Subject, Who};
 pub use statistic::{STATISTICS, Statistic};
+pub use steady::STEADY;
 pub use value::{Unit, Value};
 
 use core::cmp::Ordering;
@@ -41,6 +46,7 @@ use super::count::Counts;
 use super::episode::Episodes;
 use super::histogram::{self, Histograms};
 use super::layout::Layout;
+use super::steady::SteadyState;
 use name::What;
 
 /// The figures of one run.
@@ -49,12 +55,18 @@ pub struct Figures {
     counts: Counts,
     histograms: Histograms,
     episodes: Episodes,
+    steady: Option<SteadyState>,
 }
 
 impl Figures {
     /// The figures of what a run counted and recorded.
     pub const fn new(counts: Counts, histograms: Histograms, episodes: Episodes) -> Self {
-        Self { counts, histograms, episodes }
+        Self { counts, histograms, episodes, steady: None }
+    }
+    /// The same with the steady state that was watched for; without, its figures have no value.
+    #[must_use]
+    pub fn with_steady_state(self, steady: Option<SteadyState>) -> Self {
+        Self { steady, ..self }
     }
     /// What was counted.
     pub const fn counts(&self) -> &Counts {
@@ -67,6 +79,10 @@ impl Figures {
     /// What became of disturbances.
     pub const fn episodes(&self) -> &Episodes {
         &self.episodes
+    }
+    /// The steady state, if it was watched for.
+    pub const fn steady_state(&self) -> Option<&SteadyState> {
+        self.steady.as_ref()
     }
     /// What was recorded, for its memory to serve again.
     pub fn into_histograms(self) -> Histograms {
@@ -132,14 +148,9 @@ impl Figures {
         match what {
             What::Family(family) => self.counted(family, subject, 0),
             What::Fault(family, code) => self.counted(family, subject, code),
-            What::Distribution(quantity, of) => {
-                let subject = match subject {
-                    Subject::Network => histogram::Subject::Network,
-                    Subject::Slave(address) => histogram::Subject::Slave(address),
-                    Subject::Link(publisher, subscriber) => histogram::Subject::Link(publisher, subscriber),
-                    Subject::Master(_) | Subject::Station(_) | Subject::Acyclic(_) => return None,
-                };
-                of.of(self.histograms.get(quantity.name, subject)?)
+            What::Distribution(quantity, of) => of.of(self.histograms.get(quantity.name, recorded(subject)?)?),
+            What::Steady(quantity, of) => {
+                of.of(&self.steady.as_ref()?.values(quantity.name, recorded(subject)?, &self.histograms)?)
             }
         }
     }
@@ -168,4 +179,14 @@ impl Figures {
             _ => None,
         }
     }
+}
+
+/// The subject of a distribution; none of those that have no distributions.
+const fn recorded(subject: Subject) -> Option<histogram::Subject> {
+    Some(match subject {
+        Subject::Network => histogram::Subject::Network,
+        Subject::Slave(address) => histogram::Subject::Slave(address),
+        Subject::Link(publisher, subscriber) => histogram::Subject::Link(publisher, subscriber),
+        Subject::Master(_) | Subject::Station(_) | Subject::Acyclic(_) => return None,
+    })
 }

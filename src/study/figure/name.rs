@@ -4,6 +4,7 @@ use core::fmt;
 
 use super::family::{self, CODE, FAMILIES, Family};
 use super::statistic::{Of, STATISTICS};
+use super::steady::{self, STEADY};
 use super::value::Unit;
 use crate::observation::MasterClass;
 use crate::study::histogram::{self, QUANTITIES, Quantity};
@@ -112,8 +113,10 @@ impl Scope {
             }
             None => vec![family.name.to_owned()],
         });
-        let quantities = self.quantities().map(|quantity| quantity.name);
-        families.chain(quantities.flat_map(|name| STATISTICS.iter().map(move |row| format!("{name}.{}", row.name))))
+        let quantities = || self.quantities().map(|quantity| quantity.name);
+        let all = quantities().flat_map(|name| STATISTICS.iter().map(move |row| format!("{name}.{}", row.name)));
+        let steady = |name| STEADY.iter().map(move |row| format!("{}{name}.{}", steady::BEGIN, row.0));
+        families.chain(all).chain(quantities().flat_map(steady))
     }
 }
 
@@ -180,6 +183,7 @@ pub(super) enum What {
     Family(&'static Family),
     Fault(&'static Family, u16),
     Distribution(&'static Quantity, Of),
+    Steady(&'static Quantity, steady::Of),
 }
 
 /// The name of a figure that can be asked of a run.
@@ -262,6 +266,7 @@ impl Figure {
         match self.what {
             What::Family(family) | What::Fault(family, _) => family.unit,
             What::Distribution(quantity, of) => of.unit(quantity),
+            What::Steady(quantity, of) => of.unit(quantity),
         }
     }
     /// Whether it can be below zero.
@@ -270,6 +275,15 @@ impl Figure {
             What::Family(family) => family.name == family::LEFT,
             What::Fault(..) => false,
             What::Distribution(quantity, of) => quantity.signed && !of.is_magnitude(),
+            What::Steady(quantity, of) => quantity.signed && !of.is_magnitude(),
+        }
+    }
+    /// Whether it is of the steady state, which is watched for only where somebody asks.
+    pub fn is_of_steady_state(&self) -> bool {
+        match self.what {
+            What::Family(family) => steady::is_asked(family.name),
+            What::Steady(..) => true,
+            What::Fault(..) | What::Distribution(..) => false,
         }
     }
     /// Its name as that of a column of a table, with its unit: `slave_3_pll_error_p99_ns`.
@@ -286,7 +300,7 @@ impl Figure {
         let scope = self.scope();
         let all = scope.subjects(layout);
         let absent = |message: String, help: &str| Err(FigureError::new(message, help));
-        if let What::Distribution(quantity, _) = self.what
+        if let What::Distribution(quantity, _) | What::Steady(quantity, _) = self.what
             && quantity.subjects(layout).is_empty()
             && scope == Scope::Network
         {
@@ -410,8 +424,12 @@ fn what(scope: Scope, end: &str) -> Option<What> {
     if let Some((family, code)) = scope.families().find_map(|family| Some((family, by_code(&family)?))) {
         return Some(What::Fault(family, code));
     }
+    let (steady, end) = end.strip_prefix(steady::BEGIN).map_or((false, end), |end| (true, end));
     let (quantity, statistic) = end.split_once('.')?;
     let quantity = scope.quantities().find(|row| row.name == quantity)?;
+    if steady {
+        return Some(What::Steady(quantity, steady::Of::named(statistic)?));
+    }
     Some(What::Distribution(quantity, Of::named(statistic)?))
 }
 
@@ -425,6 +443,11 @@ fn unknown(name: &str, scope: Scope, end: &str) -> FigureError {
     if scope.quantities().any(|row| row.name == end) {
         let all: Vec<_> = STATISTICS.iter().map(|row| row.name).collect();
         let known = format!("\"{name}\" is a distribution: behind it comes {}, p95 ...", all.join(", "));
+        return FigureError::new(message, known);
+    }
+    if end.strip_prefix(steady::BEGIN).is_some_and(|end| scope.quantities().any(|row| row.name == end)) {
+        let all: Vec<_> = STEADY.iter().map(|row| row.0).collect();
+        let known = format!("\"{name}\" is a quantity in steady state: behind it comes {}, p95 ...", all.join(", "));
         return FigureError::new(message, known);
     }
     let begin = &name[..name.len() - end.len()];

@@ -2,6 +2,7 @@
 
 use super::name::{Figure, Scope};
 use super::statistic::STATISTICS;
+use super::steady::STEADY;
 use super::value::Unit;
 use crate::study::layout::Layout;
 use crate::study::report::aligned;
@@ -32,6 +33,13 @@ pub fn list() -> String {
     let rows: Vec<_> = STATISTICS.iter().map(|row| vec![row.name.to_owned(), row.what.to_owned()]).collect();
     lines.extend(aligned(
         &["statistic", "what it is; any other percentile, p95 or magnitude_p99.99, can be asked too"],
+        &[0, 1],
+        &rows,
+    ));
+    lines.push(String::new());
+    let rows: Vec<_> = STEADY.iter().map(|row| vec![row.0.to_owned(), row.1.to_owned()]).collect();
+    lines.extend(aligned(
+        &["steady state", "steady. before a distribution: its values in steady state"],
         &[0, 1],
         &rows,
     ));

@@ -76,7 +76,7 @@ impl Of {
 }
 
 /// A percentage from `0` to `100` with at most three decimals, in thousandths.
-fn thousandths(text: &str) -> Option<u32> {
+pub(super) fn thousandths(text: &str) -> Option<u32> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, "0"));
     let digits = |part: &str| (1..=3).contains(&part.len()) && part.bytes().all(|octet| octet.is_ascii_digit());
     if !digits(whole) || !digits(fraction) {

@@ -43,6 +43,8 @@ pub struct BatchMeans {
 pub struct StreamMean {
     /// The mean of all values and its bounds, in their unit.
     pub interval: Interval,
+    /// Standard error of the mean.
+    pub error: f64,
     /// Number of batches that the bounds were made of.
     pub batches: usize,
     /// Values in each.
@@ -106,6 +108,7 @@ impl BatchMeans {
         let chance = normal_quantile(FALSE_ALARM) / (self.sums.len() as f64).sqrt();
         Some(StreamMean {
             interval: Interval::around(mean, student_quantile(freedom, confidence) * error),
+            error,
             batches: count,
             length: self.length * join as u64,
             correlation,

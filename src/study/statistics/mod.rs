@@ -11,7 +11,6 @@ pub mod bins;
 pub mod bisection;
 pub mod confidence;
 pub mod interval;
-pub mod keyed;
 pub mod normal;
 pub mod probability;
 pub mod quantile;

@@ -5,7 +5,7 @@
 //! values, and enough of them: of 100 values none bounds the 99 % quantile from above.
 
 use super::beta::{Share, binomial_cdf};
-use super::bins::{Bins, Counted};
+use super::bins::Counted;
 use super::confidence::Confidence;
 use crate::study::histogram::Histogram;
 
@@ -53,6 +53,23 @@ impl Ranks {
             high: (above > 0).then(|| count + 1 - above),
         })
     }
+    /// The same for `count` values of which neighbours are alike, so that all of them tell as much as `worth` independent
+    /// ones: each of these stands for as many of the others.
+    pub fn of_dependent(count: u64, worth: u64, percent: f64, confidence: Confidence) -> Option<Self> {
+        let worth = worth.clamp(1, count.max(1));
+        let Self { low, high, .. } = Self::new(worth, percent, confidence)?;
+        let of_all = |rank: u64, round: u128| {
+            let rank = (u128::from(rank) * u128::from(count) + round) / u128::from(worth);
+            rank as u64
+        };
+        Some(Self {
+            // The first of those that this one stands for.
+            low: low.map(|low| of_all(low - 1, 0) + 1),
+            // The last of them.
+            high: high.map(|high| of_all(high, u128::from(worth) - 1)),
+            ..Self::new(count, percent, confidence)?
+        })
+    }
     fn pick<V>(&self, value: impl Fn(u64) -> V) -> QuantileInterval<V> {
         QuantileInterval { estimate: value(self.estimate), low: self.low.map(&value), high: self.high.map(&value) }
     }
@@ -82,14 +99,6 @@ pub fn of_sorted<V: PartialOrd + Copy>(
     Some(ranks.pick(|rank| sorted[rank as usize - 1]))
 }
 
-/// The same of values in bins: the estimate is the middle of its bin, the bounds are the far ends of theirs.
-pub fn of_bins(bins: &Bins, percent: f64, confidence: Confidence) -> Option<QuantileInterval<i64>> {
-    let ranks = Ranks::new(bins.count(), percent, confidence)?;
-    let bins: Vec<_> = bins.iter().collect();
-    let middle = |bin: Counted| bin.low + (bin.high.abs_diff(bin.low) / 2) as i64;
-    Some(of_counted(&bins, &ranks, middle))
-}
-
 /// The same of a histogram, in ticks of 1/12 ns: the estimate is its [`percentile`](Histogram::percentile).
 pub fn of_histogram(histogram: &Histogram, percent: f64, confidence: Confidence) -> Option<QuantileInterval<i64>> {
     let ranks = Ranks::new(histogram.count(), percent, confidence)?;
@@ -97,7 +106,15 @@ pub fn of_histogram(histogram: &Histogram, percent: f64, confidence: Confidence)
     Some(of_counted(&histogram.counted(), &ranks, |_| estimate))
 }
 
-fn of_counted(bins: &[Counted], ranks: &Ranks, estimate: impl Fn(Counted) -> i64) -> QuantileInterval<i64> {
+/// The same of bins in ascending order, which hold as many values as `ranks` are of.
+///
+/// # Panics
+/// If they hold less.
+pub(in crate::study) fn of_counted(
+    bins: &[Counted],
+    ranks: &Ranks,
+    estimate: impl Fn(Counted) -> i64,
+) -> QuantileInterval<i64> {
     let at = |rank: u64| {
         let mut left = rank;
         let found = bins.iter().find(|bin| {
@@ -153,6 +170,26 @@ mod tests {
     }
 
     #[test]
+    fn dependent_values_bound_as_few_independent_ones_do() {
+        for (count, worth) in [(1_000, 1_000), (1_000, 100), (997, 31), (50, 50)] {
+            for percent in [50.0, 90.0] {
+                let (few, all) = (ranks(worth, percent), ranks(count, percent));
+                let found = Ranks::of_dependent(count, worth, percent, Confidence::USUAL).unwrap();
+                assert_eq!(found.estimate, all.estimate);
+                let share = |rank: u64, of: u64| rank as f64 / of as f64;
+                assert!(share(few.low.unwrap(), worth) >= share(found.low.unwrap(), count), "{count} {worth}");
+                assert!(found.low <= all.low && found.high.is_none_or(|high| Some(high) >= all.high && high <= count));
+                assert_eq!(few.high.is_some(), found.high.is_some());
+            }
+        }
+        // More cannot be told than there are, and of one value hardly anything.
+        assert_eq!(Ranks::of_dependent(20, 100, 50.0, Confidence::USUAL), Some(ranks(20, 50.0)));
+        let one = Ranks::of_dependent(1_000, 0, 50.0, Confidence::USUAL).unwrap();
+        assert_eq!((one.low, one.high), (None, None));
+        assert_eq!(Ranks::of_dependent(0, 10, 50.0, Confidence::USUAL), None);
+    }
+
+    #[test]
     fn bounds_are_as_narrow_as_the_confidence_allows() {
         for count in [10, 77, 1_000, 100_000] {
             for percent in [1.0, 25.0, 50.0, 90.0, 99.9] {
@@ -170,39 +207,34 @@ mod tests {
     }
 
     #[test]
-    fn sorted_values_bins_and_histograms_agree() {
+    fn sorted_values_and_histograms_agree() {
         let mut values: Vec<i64> = (0..2_000).map(|i| i * 7_919 % 4_001 - 2_000).collect();
-        let (mut bins, mut histogram) = (Bins::default(), Histogram::new(Span::from_ms(1), true));
+        let mut histogram = Histogram::new(Span::from_ms(1), true);
         for &value in &values {
-            bins.add(value);
             histogram.record(Span::from_ticks(value));
         }
         values.sort_unstable();
         for percent in [0.0, 0.1, 5.0, 50.0, 99.0, 100.0] {
             let exact = of_sorted(&values, percent, Confidence::USUAL);
-            assert_eq!(of_bins(&bins, percent, Confidence::USUAL), exact, "{percent}");
             assert_eq!(of_histogram(&histogram, percent, Confidence::USUAL), exact, "{percent}");
         }
         assert_eq!(of_sorted::<f64>(&[], 50.0, Confidence::USUAL), None);
-        assert_eq!(of_bins(&Bins::default(), 50.0, Confidence::USUAL), None);
+        assert_eq!(of_histogram(&Histogram::new(Span::from_ms(1), true), 50.0, Confidence::USUAL), None);
     }
 
     #[test]
     fn bounds_of_shared_bins_are_their_far_ends() {
         // Values 1 000 000 .. 1 000 999, in bins of 512 ticks; 20 of them beyond the histogram's limit.
-        let (mut bins, mut histogram) = (Bins::default(), Histogram::new(Span::from_ticks(1_000_979), false));
+        let mut histogram = Histogram::new(Span::from_ticks(1_000_979), false);
         let values: Vec<i64> = (1_000_000..1_001_000).collect();
         for &value in &values {
-            bins.add(value);
             histogram.record(Span::from_ticks(value));
         }
         for percent in [10.0, 50.0, 90.0] {
             let exact = of_sorted(&values, percent, Confidence::USUAL).unwrap();
-            let of = [of_bins(&bins, percent, Confidence::USUAL), of_histogram(&histogram, percent, Confidence::USUAL)];
-            for found in of.map(Option::unwrap) {
-                assert!(found.low <= exact.low && found.low.unwrap() > exact.low.unwrap() - 1_024, "{found:?}");
-                assert!(found.high >= exact.high && found.high.unwrap() < exact.high.unwrap() + 1_024, "{found:?}");
-            }
+            let found = of_histogram(&histogram, percent, Confidence::USUAL).unwrap();
+            assert!(found.low <= exact.low && found.low.unwrap() > exact.low.unwrap() - 1_024, "{found:?}");
+            assert!(found.high >= exact.high && found.high.unwrap() < exact.high.unwrap() + 1_024, "{found:?}");
         }
         let found = of_histogram(&histogram, 99.0, Confidence::USUAL).unwrap();
         assert_eq!(

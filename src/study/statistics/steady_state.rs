@@ -98,6 +98,10 @@ impl SteadyWatch {
         self.since.filter(|_| self.settled)
     }
 
+    /// What becomes the beginning of the steady state if nothing is lost again.
+    pub fn candidate(&self) -> Option<Steady> {
+        self.since
+    }
     /// What is missing for a steady state, by the slave's number.
     pub fn missing(&self) -> impl Iterator<Item = (usize, Condition)> {
         let slaves = self.holds.iter().enumerate();

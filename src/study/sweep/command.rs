@@ -118,11 +118,11 @@ pub fn sweep(call: &Call, stop: &AtomicBool, watch: impl FnMut(Progress)) -> Res
     }
     store.sort(&plan.definition.figure_names())?;
     let failed = failures(&plan, call.shard, &store)?;
-    let files = if call.shard.is_all() { conclude(&plan, &store)? } else { Vec::new() };
+    let concluded = if call.shard.is_all() { Some(conclude(&plan, &store)?) } else { None };
     let counts = page::Counts { before, done };
     let end = if failed.is_empty() { End::Done } else { End::Failed };
     let lines = page::Failures { base: &base.source, failed: &failed };
-    Ok(Answer { page: page::done(&plan, call.shard, counts, &lines, store.dir(), &files), end })
+    Ok(Answer { page: page::done(&plan, call.shard, counts, &lines, store.dir(), concluded.as_ref()), end })
 }
 
 /// Joins the parts of a sweep into `out`.
@@ -136,10 +136,10 @@ pub fn join(out: &Path, parts: &[PathBuf]) -> Result<Answer, SweepError> {
         left += usize::from(store.journal.get(job.key)?.is_none());
     }
     let failed = failures(&plan, Shard::ALL, &store)?;
-    let files = if left == 0 { conclude(&plan, &store)? } else { Vec::new() };
+    let concluded = if left == 0 { Some(conclude(&plan, &store)?) } else { None };
     let end = if left > 0 || !failed.is_empty() { End::Failed } else { End::Done };
     let lines = page::Failures { base: &plan.definition.base, failed: &failed };
-    Ok(Answer { page: page::merged(&plan, parts.len(), left, &lines, store.dir(), &files), end })
+    Ok(Answer { page: page::merged(&plan, parts.len(), left, &lines, store.dir(), concluded.as_ref()), end })
 }
 
 /// Does the runs that are left, and those that the stop rule asks for then. Returns how many were done.
@@ -183,8 +183,8 @@ fn failures(plan: &Plan, shard: Shard, store: &Store) -> Result<Vec<Failed>, Swe
     Ok(failed)
 }
 
-/// Writes the tables and the pictures. Returns their names.
-fn conclude(plan: &Plan, store: &Store) -> Result<Vec<String>, SweepError> {
+/// Writes the tables and the pictures.
+fn conclude(plan: &Plan, store: &Store) -> Result<page::Concluded, SweepError> {
     let mut files =
         vec![results::write(store.dir(), plan, &store.journal)?, summary::write(store.dir(), plan, &store.journal)?];
     for (name, text) in picture::draw(plan, &store.journal)? {
@@ -194,5 +194,6 @@ fn conclude(plan: &Plan, store: &Store) -> Result<Vec<String>, SweepError> {
     }
     let placed = Staged::place_all(files)?;
     let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
-    Ok(placed.iter().filter_map(name).collect())
+    let never = summary::never(plan, &store.journal)?;
+    Ok(page::Concluded { files: placed.iter().filter_map(name).collect(), never })
 }

@@ -7,12 +7,40 @@ use super::command::{Call, Failed};
 use super::journal::Journal;
 use super::plan::{Base, Plan};
 use super::shard::Shard;
+use super::summary::Never;
+use crate::study::report::number;
 
 /// What a cycle of a slave costs, rows and histograms included (ns): processor time of a network of 8 encoders on a
 /// virtual AMD EPYC, see `benches/README.md`. It is an estimate before the first run, and nothing depends on it.
 const NS_PER_SLAVE_CYCLE: u64 = 400;
 /// Most failed runs and refused combinations that a page names.
 const NAMED: usize = 10;
+
+/// The files of a sweep that is over, and what may not be taken for granted of them.
+#[derive(Default)]
+pub(super) struct Concluded {
+    pub(super) files: Vec<String>,
+    /// Counts that were never above 0.
+    pub(super) never: Vec<Never>,
+}
+
+impl Concluded {
+    /// Where the files are; what was never seen is no less possible for it.
+    fn text(&self, plan: &Plan, dir: &Path) -> String {
+        let mut text = String::new();
+        for Never { figure, combinations, runs, bound } in &self.never {
+            let (all, confidence) = (plan.combinations_to_run(), plan.definition.confidence);
+            let _ = writeln!(
+                text,
+                "{figure}: 0 in every run of {combinations} of {all} combinations; {} of each leave it possible, at \
+                 {confidence}, that up to {:.2} % have one (rule of three)",
+                number(*runs, "run"),
+                bound * 100.0
+            );
+        }
+        text + &format!("\nfiles in {}: {}\n", dir.display(), self.files.join(", "))
+    }
+}
 
 /// Runs that are done.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +99,7 @@ pub(super) fn done(
     counts: Counts,
     failures: &Failures<'_>,
     dir: &Path,
-    files: &[String],
+    concluded: Option<&Concluded>,
 ) -> String {
     let Counts { before, done } = counts;
     let part = if shard.is_all() { String::new() } else { format!(", part {shard}") };
@@ -84,11 +112,11 @@ pub(super) fn done(
         failures.failed.len()
     );
     page += &failures.text(plan);
-    match files {
-        [] => {
+    match concluded {
+        None => {
             let _ = writeln!(page, "\nthis part is in {}; isodp merge OUT PART... joins all parts", dir.display());
         }
-        files => page += &written(dir, files),
+        Some(concluded) => page += &concluded.text(plan, dir),
     }
     page
 }
@@ -100,15 +128,15 @@ pub(super) fn merged(
     left: usize,
     failures: &Failures<'_>,
     dir: &Path,
-    files: &[String],
+    concluded: Option<&Concluded>,
 ) -> String {
     let mut page = format!("sweep {}: {parts} parts joined, {} failed\n", plan.definition.name, failures.failed.len());
     page += &failures.text(plan);
-    match files {
-        [] => {
+    match concluded {
+        None => {
             let _ = writeln!(page, "\n{left} runs are in none of the parts; what there is is in {}", dir.display());
         }
-        files => page += &written(dir, files),
+        Some(concluded) => page += &concluded.text(plan, dir),
     }
     page
 }
@@ -135,10 +163,6 @@ fn again(call: &Call) -> String {
         let _ = write!(text, " --shard {}", call.shard);
     }
     text
-}
-
-fn written(dir: &Path, files: &[String]) -> String {
-    format!("\nfiles in {}: {}\n", dir.display(), files.join(", "))
 }
 
 /// Combinations that are not run.

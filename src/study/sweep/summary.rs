@@ -5,6 +5,7 @@
 //! | `n` | repetitions with a value; those that failed or had nothing to tell are not among them |
 //! | `mean`, `low`, `high` | the mean and its bounds at the sweep's confidence: Student's; of true and false, the share of the true ones with the bounds of Clopper and Pearson |
 //! | `min`, `p50`, `p90`, `max` | values that runs had: the smallest, those of rank ceil(n / 2) and ceil(9 n / 10), the largest |
+//! | `p50_low`, `p50_high`, `p90_low`, `p90_high` | values that runs had and that bound these at the sweep's confidence, whatever the distribution; empty where n is too small for one |
 //! | `seen`, `seen_low`, `seen_high` | of a count, the share of repetitions in which it is above 0, with the bounds of Clopper and Pearson |
 
 use std::cmp::Ordering;
@@ -20,6 +21,7 @@ use crate::study::figure::{Figure, Unit, Value};
 use crate::study::statistics::confidence::Confidence;
 use crate::study::statistics::interval::Interval;
 use crate::study::statistics::probability::Probability;
+use crate::study::statistics::quantile::Ranks;
 use crate::study::statistics::student::student_quantile;
 
 /// File of the rows.
@@ -35,14 +37,18 @@ struct Statistic {
 
 /// What is told of each figure. One line here is all that a new one needs.
 #[rustfmt::skip]
-const STATISTICS: [Statistic; 11] = [
+const STATISTICS: [Statistic; 15] = [
     Statistic { name: "n", of_counts: false, of: |sample| Some(sample.values.len().to_string()) },
     Statistic { name: "mean", of_counts: false, of: |sample| number(sample.mean()) },
     Statistic { name: "low", of_counts: false, of: |sample| number(sample.interval().map(|interval| interval.low)) },
     Statistic { name: "high", of_counts: false, of: |sample| number(sample.interval().map(|interval| interval.high)) },
     Statistic { name: "min", of_counts: false, of: |sample| sample.ranked(0, 1) },
     Statistic { name: "p50", of_counts: false, of: |sample| sample.ranked(1, 2) },
+    Statistic { name: "p50_low", of_counts: false, of: |sample| sample.bound(50.0, |ranks| ranks.low) },
+    Statistic { name: "p50_high", of_counts: false, of: |sample| sample.bound(50.0, |ranks| ranks.high) },
     Statistic { name: "p90", of_counts: false, of: |sample| sample.ranked(9, 10) },
+    Statistic { name: "p90_low", of_counts: false, of: |sample| sample.bound(90.0, |ranks| ranks.low) },
+    Statistic { name: "p90_high", of_counts: false, of: |sample| sample.bound(90.0, |ranks| ranks.high) },
     Statistic { name: "max", of_counts: false, of: |sample| sample.ranked(1, 1) },
     Statistic { name: "seen", of_counts: true, of: |sample| number(sample.seen().estimate()) },
     Statistic { name: "seen_low", of_counts: true, of: |sample| number(Some(sample.seen().bounds().0)) },
@@ -99,6 +105,14 @@ impl<'a> Sample<'a> {
     /// The value of rank ceil(part / whole x n), at least 1.
     fn ranked(&self, part: usize, whole: usize) -> Option<String> {
         let rank = (self.values.len() * part).div_ceil(whole).max(1);
+        self.of_rank(rank)
+    }
+    /// A bound of what `percent` of all runs do not exceed.
+    fn bound(&self, percent: f64, of: fn(&Ranks) -> Option<u64>) -> Option<String> {
+        let ranks = Ranks::new(self.values.len() as u64, percent, self.confidence)?;
+        self.of_rank(of(&ranks)? as usize)
+    }
+    fn of_rank(&self, rank: usize) -> Option<String> {
         self.values.get(rank - 1).map(|&value| cell(value, self.figure.unit()))
     }
 }
@@ -170,6 +184,41 @@ pub(super) fn write(dir: &Path, plan: &Plan, journal: &Journal) -> Result<Staged
     table.finish()
 }
 
+/// A count that stayed 0 in all repetitions of some combinations.
+pub(super) struct Never {
+    /// Name of the figure.
+    pub(super) figure: String,
+    /// In how many combinations.
+    pub(super) combinations: usize,
+    /// Fewest repetitions of these with a value.
+    pub(super) runs: u64,
+    /// Upper bound of the probability that a run of such a combination has some: about 3 / runs (rule of three).
+    pub(super) bound: f64,
+}
+
+/// The counts that were never above 0 in some combinations, which is no proof that they never are.
+///
+/// # Errors
+/// The journal cannot be read.
+pub(super) fn never(plan: &Plan, journal: &Journal) -> Result<Vec<Never>, StoreError> {
+    let figures = &plan.definition.figures;
+    let mut all: Vec<Option<(usize, u64)>> = vec![None; figures.len()];
+    for row in rows(plan, journal) {
+        for (sample, never) in row?.samples.iter().zip(&mut all) {
+            if sample.figure.unit() == Unit::Count && matches!(sample.seen(), Probability::UpperBound(_)) {
+                let (combinations, runs) = never.unwrap_or((0, u64::MAX));
+                *never = Some((combinations + 1, runs.min(sample.values.len() as u64)));
+            }
+        }
+    }
+    let named = figures.iter().zip(all).filter_map(|(figure, never)| Some((figure, never?)));
+    let told = named.map(|(figure, (combinations, runs))| {
+        let bound = Probability::of(0, runs, plan.definition.confidence).bounds().1;
+        Never { figure: figure.name().to_owned(), combinations, runs, bound }
+    });
+    Ok(told.collect())
+}
+
 /// The statistics that are told of this figure.
 fn told(figure: &Figure) -> impl Iterator<Item = &'static Statistic> {
     let counts = figure.unit() == Unit::Count;
@@ -199,26 +248,38 @@ mod tests {
         // t of 4 degrees at 95 % is 2.776445, the deviation of the mean is sqrt(2.5 / 5).
         near(&told[2], 3.0 - 2.776_445_105 * 0.5_f64.sqrt());
         near(&told[3], 3.0 + 2.776_445_105 * 0.5_f64.sqrt());
-        assert_eq!(told[4..], ["1.000", "3.000", "5.000", "5.000"]);
+        // Five values are too few for a bound of the median: all are below it once in 32.
+        assert_eq!(told[4..], ["1.000", "3.000", "", "", "5.000", "3.000", "", "5.000"]);
+    }
+
+    #[test]
+    fn bounds_of_percentiles_are_values_that_were_seen() {
+        // Conover's table of the sign test: of 20 the 6th and the 15th bound the median.
+        let values: Vec<_> = (1..=20).map(|ns| Value::Span(Span::from_ns(ns))).collect();
+        let told = told_of("latch_skew.p99", &values);
+        assert_eq!(told[5..8], ["10.000", "6.000", "15.000"]);
+        // 0.9^20 is 12 %: no value of 20 is above the 90 % quantile often enough.
+        assert_eq!(told[8], "18.000");
+        assert_eq!(told[10], "");
     }
 
     #[test]
     fn a_count_tells_how_likely_it_is_at_all() {
         let values: Vec<_> = (0..20).map(|run| Value::Count(if run < 5 { run + 1 } else { 0 })).collect();
         let told = told_of("faults", &values);
-        near(&told[8], 0.25);
-        near(&told[9], 0.086_571_469);
-        near(&told[10], 0.491_045_872);
+        near(&told[12], 0.25);
+        near(&told[13], 0.086_571_469);
+        near(&told[14], 0.491_045_872);
         let never = told_of("faults", &[Value::Count(0); 10]);
-        assert_eq!((never[8].as_str(), never[9].as_str()), ("0", "0"));
-        near(&never[10], 1.0 - 0.05_f64.powf(0.1));
+        assert_eq!((never[12].as_str(), never[13].as_str()), ("0", "0"));
+        near(&never[14], 1.0 - 0.05_f64.powf(0.1));
     }
 
     #[test]
     fn nothing_is_told_of_nothing() {
-        assert_eq!(told_of("latch_skew.p99", &[]), ["0", "", "", "", "", "", "", ""]);
+        assert_eq!(told_of("latch_skew.p99", &[]), ["0", "", "", "", "", "", "", "", "", "", "", ""]);
         let one = told_of("latch_skew.p99", &[Value::Span(Span::from_ns(7))]);
-        assert_eq!(one, ["1", "7", "", "", "7.000", "7.000", "7.000", "7.000"]);
+        assert_eq!(one, ["1", "7", "", "", "7.000", "7.000", "", "", "7.000", "", "", "7.000"]);
         let truths = [Value::Truth(true), Value::Truth(true), Value::Truth(false), Value::Truth(true)];
         assert_eq!(told_of("slave.3.in_operation", &truths)[..2], ["4", "0.75"]);
     }

@@ -34,7 +34,8 @@ impl Worker {
         }
         let (_, scenario) = self.scenario.as_mut()?;
         scenario.run.seed = seed;
-        match attempt(scenario, self.histograms.take(), || !stop.load(Ordering::Relaxed)) {
+        let figures = &plan.definition.figures;
+        match attempt(figures, scenario, self.histograms.take(), || !stop.load(Ordering::Relaxed)) {
             Ok(Some(figures)) => {
                 let broken = broken(scenario, &figures);
                 let record = Record { key, seed, figures: collect(&plan.definition, &figures), broken, failure: None };

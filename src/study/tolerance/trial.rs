@@ -150,7 +150,7 @@ impl<'a> Trial<'a> {
 impl Worker {
     /// Does a run; none if it was broken off from outside.
     fn run(&mut self, go_on: impl Fn() -> bool) -> Option<Told> {
-        match attempt(&self.scenario, self.histograms.take(), go_on) {
+        match attempt(&[], &self.scenario, self.histograms.take(), go_on) {
             Ok(Some(figures)) => {
                 let mut broken = judge(&self.scenario.expectations, &figures);
                 broken.retain(|verdict| !verdict.passed);

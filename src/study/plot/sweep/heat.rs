@@ -60,13 +60,17 @@ impl Heat {
     /// What the library says.
     pub fn draw(&self) -> Result<String, String> {
         let title = format!("{} over {} and {}", self.sheet.figure, self.x.name, self.y.name);
+        let fails = self.cells.iter().flatten().any(|cell| cell.fails);
+        let outlined = if fails { format!(" Outlined: {}.", self.fails) } else { String::new() };
         let subtitle = format!(
-            "Sweep {}: mean of the repetitions of each combination; empty cells were not run. Outlined: {}.",
-            self.sheet.sweep, self.fails
+            "Sweep {}: mean of the repetitions of each combination; empty cells were not run.{outlined}",
+            self.sheet.sweep
         );
         let footer = self.sheet.footer("mean per combination");
         sheet(&title, &subtitle, &footer, HEIGHT, |canvas, mut area| {
-            legend(canvas, &mut area, &[Key::new(self.fails.clone(), VERMILION, Swatch::Line)]);
+            if fails {
+                legend(canvas, &mut area, &[Key::new(self.fails.clone(), VERMILION, Swatch::Line)]);
+            }
             let inner = Area { left: area.left + LEFT, right: area.right - RIGHT, bottom: area.bottom - BELOW, ..area };
             let (lo, hi) = ends(self.cells.iter().flatten().filter_map(|cell| cell.mean));
             self.fill(canvas, inner, (lo, hi));
