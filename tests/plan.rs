@@ -820,7 +820,7 @@ fn a_plan_of_two_masters_tells_what_the_token_may_do() {
     let scenario = crate::support::scenario("two-masters", &[]);
     let (bus, t_dp) = (scenario.bus.params, scenario.master.t_dp);
     let plan = Plan::of(&scenario);
-    assert_eq!(plan.t_th(&bus, t_dp), bus.span(Tbit(9_000)));
+    assert_eq!(plan.t_th(&bus, t_dp), bus.span(Tbit(8_900)));
     let bits = |bits: u32| bus.span(Tbit(bits));
     // Longest Data_Exchange 143 + 800 + 231 + 76, token and T_ID1; of 27 slaves, Global_Control with T_ID2, GAP.
     let visit = plan.visits[0];
@@ -828,14 +828,14 @@ fn a_plan_of_two_masters_tells_what_the_token_may_do() {
     assert_eq!(visit.work, bits(27 * 1_250 + 143 + 800 + 1_142 + 109));
     assert_eq!(plan.content(), plan.own() + bits(1_359));
     assert_eq!(plan.least_t_tr(&bus), Tbit(2 * (109 + 1_250) + 1_250));
-    assert_eq!(plan.synch_delay(&bus, t_dp), plan.own() + bits(9_000 + 1_359) - t_dp);
+    assert_eq!(plan.synch_delay(&bus, t_dp), plan.own() + bits(8_900 + 1_359) - t_dp);
     let t_tr = plan.longest_t_tr(&bus, t_dp).expect("a T_TR");
     let findings = |t_tr: &str| {
         let scenario = crate::support::scenario("two-masters", &[("bus.t_tr", t_tr)]);
         let all = Facts::of(&scenario).findings();
         all.into_iter().filter(|found| !found.holds()).map(|found| found.rule.text).collect::<Vec<_>>()
     };
-    assert_eq!(findings("21000 tbit"), ["T_DP holds the longest visits of the token"]);
+    assert_eq!(findings("20900 tbit"), ["T_DP holds the longest visits of the token"]);
     assert_eq!(findings(&t_tr.to_string()), Vec::<&str>::new());
     assert_eq!(findings("3967 tbit"), ["T_TR >= n (T_TC + T_MC) + k T_MC"]);
     // A run is never later than planned, and with the T_TR that is told never late.

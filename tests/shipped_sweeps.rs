@@ -181,7 +181,7 @@ fn losses_become_faults_as_often_as_the_chain_of_the_counter_says() {
     assert_eq!(rows.len(), 16);
     for row in rows {
         let tolerance = row.number("slave_1_max_life_failures") as usize;
-        let loss: f64 = row.text("disturbance_1_rate").trim_end_matches(" %").parse().expect("a share");
+        let loss = row.number("disturbance_1_rate_percent");
         let expected = fault(tolerance, loss / 100.0, 2_000);
         let seen = (row.number("seen_faults_0F02") * f64::from(runs)).round() as u64;
         // One of sixteen intervals of 95 % fails to hold it every other time, one of 99.9 % once in 60.

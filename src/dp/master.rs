@@ -412,6 +412,7 @@ impl<A: Application> Master<A> {
     fn acyclic(&mut self, now: Local, out: &mut Outbox) {
         let since = self.clock.coming().saturating_sub(self.control_told);
         let control = self.control_due || since >= self.control_every;
+        self.note_starving();
         let rate = self.settings.bus.rate;
         let fits = (control || !self.commands.is_empty())
             && self.fits(rate.octets(GC_OCTETS) + self.settings.bus.span(self.settings.bus.t_id2()));

@@ -7,15 +7,21 @@
 //! | isochronous | comes back | holds it until SYNCH; active spare: passes it on again while T_TR fits |
 //! | free-running | comes | a poll cycle where the last one is over and long enough ago, else one acyclic message |
 //! | free-running | T_TH over | passes it on and goes on with the same slave when it is back |
+//! | free-running | comes after eight poll cycles that left no T_TH for the message due after them | that first |
 //!
 //! Model: T_TH does not limit an isochronous master, whose cycle is planned as a whole, nor a station alone. A master
 //! that holds the token in silence is heard at least every 5 T_SL, which is less than the T_TO of any address, and
 //! within T_SL of a token that it got, since its sender listens so long.
 
 use super::{Application, Master, Part, STATUS_OCTETS};
+use crate::dp::handler::Handler;
 use crate::fdl::{Outbox, Timer};
 use crate::observation::Observation;
 use crate::time::{Local, Span};
+
+/// Poll cycles in a row that may leave no time for a message. Model: no source has a number; the watchdogs of slaves last
+/// tens of cycles.
+const STARVED: u8 = 8;
 
 /// What makes a master's cycles begin.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -40,13 +46,15 @@ pub(super) struct Polling {
     next: Local,
     /// Token visits.
     visits: u64,
+    /// Poll cycles in a row with T_TH over before the message that was due after them.
+    starved: u8,
     /// The running cycle's end is not told yet.
     open: bool,
 }
 
 impl Polling {
     pub(super) const fn new() -> Self {
-        Self { stopped_at: None, began: Local::ZERO, next: Local::ZERO, visits: 0, open: false }
+        Self { stopped_at: None, began: Local::ZERO, next: Local::ZERO, visits: 0, starved: 0, open: false }
     }
 }
 
@@ -188,7 +196,7 @@ impl<A: Application> Master<A> {
         let at = self.active.free_at();
         match self.polling.stopped_at.take() {
             Some(slave) => self.exchange(now, slave, out),
-            None if at >= self.next_start() => {
+            None if at >= self.next_start() && self.polling.starved < STARVED => {
                 out.begin_cycle(at);
                 self.part = Part::Clock;
             }
@@ -197,6 +205,18 @@ impl<A: Application> Master<A> {
                 self.acyclic(now, out);
             }
         }
+    }
+    /// Counts how often T_TH was over though a slave's start-up or a job was due after the poll cycle. In the end it has a
+    /// token of its own, else a T_TR that is just long enough for Data_Exchange would let no slave start up again, ever.
+    pub(super) fn note_starving(&mut self) {
+        if !self.is_free() || self.is_alone() {
+            return;
+        }
+        let free = self.active.free_at();
+        let starting = || self.handlers.iter().any(Handler::has_service);
+        let (high_over, low_over) = (!self.active.may_high(free), !self.active.may_low(free));
+        let starves = self.polling.open && ((high_over && starting()) || (low_over && !self.ms1.is_idle()));
+        self.polling.starved = if starves { self.polling.starved + 1 } else { 0 };
     }
     /// First instant of the next cycle: from start to start at least the least cycle time, and the longest
     /// Min_Slave_Interval of the slaves that take part (EN 50170-2, bus parameters).
