@@ -295,10 +295,12 @@ impl Handler {
             StartupTelegram::Prm => self.prm = patch.apply(&self.params.prm),
             StartupTelegram::Cfg => self.cfg = patch.apply(&self.params.cfg),
         }
-        self.restart(out);
+        self.enter(HandlerState::Diagnose, out);
     }
-    /// Starts over, as after a stop of the master.
+    /// Its master has supply again: starts over with the telegrams of the configuration.
     pub fn restart(&mut self, out: &mut Outbox) {
+        self.prm.clone_from(&self.params.prm);
+        self.cfg.clone_from(&self.params.cfg);
         self.enter(HandlerState::Diagnose, out);
     }
 
@@ -496,6 +498,24 @@ mod tests {
             "nonsense"
         );
         assert_eq!(losses(&|handler, out| handler.restart(out)), 0, "the master's own will");
+    }
+
+    #[test]
+    fn a_changed_telegram_is_sent_until_the_supply_fails() {
+        let (mut handler, mut out) = (in_state(HandlerState::DataExchange), Outbox::new());
+        let mut wrong = Patch::default();
+        wrong.set_length(3);
+        let sent = |handler: &mut Handler| {
+            let mut out = Outbox::new();
+            handler.answered(Answer::Data(&[0x02, 0x05, 0x00, 0xFF, 0x80, 0xF9]), &mut out);
+            handler.answered(Answer::Data(&[2]), &mut out);
+            assert_eq!(handler.state(), HandlerState::SetPrm);
+            handler.service().1.to_vec()
+        };
+        handler.patch(StartupTelegram::Prm, &wrong, &mut out);
+        assert_eq!(sent(&mut handler), [1, 0, 0]);
+        handler.restart(&mut out);
+        assert_eq!(sent(&mut handler), [1]);
     }
 
     #[test]

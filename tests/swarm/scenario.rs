@@ -491,7 +491,7 @@ fn happenings(draw: &mut Draw, network: &Network, cycle: Span, (from, to): (Span
             }
         }
     }
-    back_in_order(&mut text, &patched, to, cycle);
+    back_in_order(&mut text, &patched, own.iter().any(|slave| slave.holds), (to, cycle));
     let scene = Scene { network, cycles: (60, 60 + length), times: (from, to), cycle };
     for _ in 0..draw.one(&[0, 0, 1, 2, 3, 5]) {
         at_risk |= disturbance(draw, &mut text, &scene);
@@ -505,11 +505,15 @@ fn order(text: &mut String, at: Span, what: &str) {
 }
 
 /// The end of all of it. What is ordered of a master without supply is not heard, so that good telegrams come again.
-fn back_in_order(text: &mut String, patched: &[u8], to: Span, cycle: Span) {
+fn back_in_order(text: &mut String, patched: &[u8], holds: bool, (to, cycle): (Span, Span)) {
     for slave in patched {
         for telegram in ["set-prm", "chk-cfg"] {
             order(text, to - cycle, &format!("do = \"{telegram}\"\nslave = {slave}"));
         }
+    }
+    // One that was spoilt on its way is not said again by itself.
+    for command in ["unsync", "unfreeze"].into_iter().filter(|_| holds) {
+        order(text, to, &format!("do = \"{command}\""));
     }
     order(text, to, "do = \"operate\"");
     order(text, to, "do = \"control-word\"\nvalue = 0\nslaves = \"all\"");
