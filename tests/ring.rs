@@ -274,6 +274,38 @@ fn run_free(master: &str, more: &str) -> Run {
     Run::of(&parse(&free(master, more)).unwrap_or_else(|error| panic!("{error}")))
 }
 
+/// T_TH is over at the end of most poll cycles: the GAP has a token of its own then, and finds who comes later.
+#[test]
+fn a_station_is_let_in_however_little_t_tr_leaves() {
+    let text = r#"
+        [run]
+        duration = "700 ms"
+        [bus]
+        rate = "1.5 Mbit/s"
+        hsa = 31
+        gap_factor = 5
+        t_tr = "5000 tbit"
+        [master]
+        address = 5
+        isochronous = false
+        [[slave]]
+        addresses = "12, 15, 26"
+        device = "posital-ocd-dpb1b"
+        [[class1]]
+        address = 21
+        [[slave]]
+        addresses = "17, 25, 27, 28, 31"
+        master = 21
+        device = "posital-ocd-dpb1b"
+        [[class2]]
+        address = 4
+        powered_at = "300 ms"
+    "#;
+    let run = Run::of(&parse(text).unwrap_or_else(|error| panic!("{error}")));
+    let entered = instants(&run, 4, &Observation::RingEntered);
+    assert!(entered.len() == 1 && entered[0] < ms(600), "{entered:?}");
+}
+
 /// T_TR leaves each master time for its Data_Exchange and hardly more: a start-up gets a token of its own in the end.
 #[test]
 fn a_slave_starts_up_again_however_little_t_tr_leaves() {

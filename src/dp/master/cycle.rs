@@ -7,7 +7,7 @@
 //! | isochronous | comes back | holds it until SYNCH; active spare: passes it on again while T_TR fits |
 //! | free-running | comes | a poll cycle where the last one is over and long enough ago, else one acyclic message |
 //! | free-running | T_TH over | passes it on and goes on with the same slave when it is back |
-//! | free-running | comes after eight poll cycles that left no T_TH for the message due after them | that first |
+//! | free-running | comes after poll cycles that left no T_TH: eight for the message due after them, two for the GAP | that first |
 //!
 //! Model: T_TH does not limit an isochronous master, whose cycle is planned as a whole, nor a station alone. A master
 //! that holds the token in silence is heard at least every 5 T_SL, which is less than the T_TO of any address, and
@@ -22,6 +22,9 @@ use crate::time::{Local, Span};
 /// Poll cycles in a row that may leave no time for a message. Model: no source has a number; the watchdogs of slaves last
 /// tens of cycles.
 const STARVED: u8 = 8;
+/// Due polls of the GAP in a row that may be left out for lack of time. Model: EN 50170-2 p. 102 has them on one of the next
+/// tokens.
+const GAP_LEFT_OUT: u8 = 2;
 
 /// What makes a master's cycles begin.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -48,13 +51,27 @@ pub(super) struct Polling {
     visits: u64,
     /// Poll cycles in a row with T_TH over before the message that was due after them.
     starved: u8,
+    /// Polls of the GAP that T_TH left no time for when they were due.
+    gap_left_out: u8,
     /// The running cycle's end is not told yet.
     open: bool,
 }
 
 impl Polling {
     pub(super) const fn new() -> Self {
-        Self { stopped_at: None, began: Local::ZERO, next: Local::ZERO, visits: 0, starved: 0, open: false }
+        Self {
+            stopped_at: None,
+            began: Local::ZERO,
+            next: Local::ZERO,
+            visits: 0,
+            starved: 0,
+            gap_left_out: 0,
+            open: false,
+        }
+    }
+    /// Whether the next token is for what poll cycles left no time for.
+    const fn is_starving(&self) -> bool {
+        self.starved >= STARVED || self.gap_left_out >= GAP_LEFT_OUT
     }
 }
 
@@ -196,7 +213,7 @@ impl<A: Application> Master<A> {
         let at = self.active.free_at();
         match self.polling.stopped_at.take() {
             Some(slave) => self.exchange(now, slave, out),
-            None if at >= self.next_start() && self.polling.starved < STARVED => {
+            None if at >= self.next_start() && !self.polling.is_starving() => {
                 out.begin_cycle(at);
                 self.part = Part::Clock;
             }
@@ -249,8 +266,14 @@ impl<A: Application> Master<A> {
     /// One address of the GAP where it is due and fits; then the token.
     pub(super) fn gap(&mut self, out: &mut Outbox) {
         let count = if self.is_free() { self.polling.visits } else { self.clock.coming() };
-        let due = count.is_multiple_of(self.settings.bus.gap_factor.into()) || self.active.ring().is_scanning();
+        let due = count.is_multiple_of(self.settings.bus.gap_factor.into())
+            || self.active.ring().is_scanning()
+            || self.polling.gap_left_out >= GAP_LEFT_OUT;
         let fits = due && self.may_low() && self.fits(self.active.longest_cycle(STATUS_OCTETS, STATUS_OCTETS));
+        if due {
+            let left_out = !fits && self.is_free() && self.polling.open;
+            self.polling.gap_left_out = if left_out { self.polling.gap_left_out + 1 } else { 0 };
+        }
         match if fits { self.active.poll_gap(self.active.free_at(), out) } else { None } {
             Some(address) => self.part = Part::Gap(address),
             None => self.token(out),
