@@ -55,6 +55,15 @@ fn jitter_tolerance() {
     }
 }
 
+/// The beginning of the long run: what is expected of all of it holds, and no row is kept for a cycle.
+#[test]
+fn a_day_begins_well() {
+    let summary = outcome(&scenario("long/day", &[("run.cycles", "20000")])).summary;
+    assert_eq!((summary.verdicts.len(), summary.passed()), (6, true));
+    let wide = [("run.cycles", "20000"), ("master.gc_jitter.bound", "1.5 us"), ("master.gc_jitter.sigma", "600 ns")];
+    assert!(!outcome(&scenario("long/day", &wide)).summary.passed());
+}
+
 /// It fails where it says that it does, and holds where it says so.
 fn canary() {
     let summary = outcome(&scenario("canary", &[])).summary;
