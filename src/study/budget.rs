@@ -19,6 +19,8 @@
 //! Of each part is told what the **loop adds**: the prediction follows a part of every jitter, so that e is larger than the
 //! jitter itself. It is the part minus the same part of the distance between the captured arrival and the master's
 //! jitter-free grid, which is what e would be if the prediction followed nothing but that grid.
+//!
+//! Propagation is a source only by its jitter, of repeaters and receivers: a delay that stays the same is in the prediction.
 
 pub mod measure;
 pub mod source;
