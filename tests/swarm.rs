@@ -295,8 +295,8 @@ fn try_case(seed: u64, case: Case) -> Tried {
     });
     match (endless, faults.is_empty(), conflicts.is_empty()) {
         (_, false, _) => Tried::Wrong(format!("ISODP_SWARM_SEED={seed}\n{}\n{}", faults.join("\n"), case.text)),
-        (_, true, false) => try_case(seed, case.with_restarts(&conflicts, end - Time::ZERO)),
-        (true, true, true) => Tried::Endless,
+        (true, true, _) => Tried::Endless,
+        (false, true, false) => try_case(seed, case.with_restarts(&conflicts, end - Time::ZERO)),
         (false, true, true) => Tried::Well,
     }
 }
