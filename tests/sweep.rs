@@ -19,7 +19,7 @@ const SWEEP: &str = r#"# Does the window hold?
 base = "scene.toml"
 repetitions = 3
 figures = ["latch_skew.p99", "faults", "slave.max.lock_time", "slave.3.in_operation", "slave.4.pll_error.max"]
-
+pool = ["latch_skew", "slave.4.pll_error"]
 [set]
 run.duration = "400 ms"
 "master.gc_jitter" = { kind = "uniform", half_width = "100 ns" }
@@ -120,13 +120,77 @@ fn a_row_says_what_a_run_of_its_parameters_says() {
 }
 
 #[test]
+fn a_pool_has_every_value_of_every_repetition_and_knows_where_the_largest_was() {
+    let room = room();
+    let page = room.runs(&["sweep", "jitter.toml"]);
+    let results = table(&room.path("out/jitter/results.csv"));
+    let pooled = table(&room.path("out/jitter/pooled_slave_4_pll_error.csv"));
+    assert_eq!(pooled.len(), 4);
+    let number = |text: &str| text.parse::<f64>().unwrap_or_else(|_| panic!("{text}"));
+    for (pool, runs) in pooled.iter().zip(results.chunks(3)) {
+        let largest = runs.iter().max_by(|one, other| {
+            let of = |row: &BTreeMap<String, String>| number(&row["slave_4_pll_error_max_ns"]);
+            of(one).total_cmp(&of(other))
+        });
+        let largest = largest.unwrap();
+        assert_eq!((&pool["max_ns"], &pool["max_run"]), (&largest["slave_4_pll_error_max_ns"], &largest["run"]));
+        assert_eq!((pool["runs"].as_str(), &pool["bus_cable_m"]), ("3", &largest["bus_cable_m"]));
+        let ordered = ["min_ns", "p50_ns", "p90_ns", "p99_ns", "p99_9_ns", "p99_99_ns", "p99_999_ns", "max_ns"];
+        assert!(ordered.map(|column| number(&pool[column])).is_sorted(), "{pool:?}");
+    }
+    // Every bin, and no value twice.
+    let bins = table(&room.path("out/jitter/pooled_slave_4_pll_error_bins.csv"));
+    let counted: f64 = bins.iter().map(|bin| number(&bin["count"])).sum();
+    let values: f64 = pooled.iter().map(|pool| number(&pool["n"])).sum();
+    assert!((counted - values).abs() < 0.5 && values > 12.0 * 150.0, "{counted} {values}");
+    // The cycle that the page names has the value, seen by a run of its own.
+    let line = page.lines().find(|line| line.starts_with("slave.4.pll_error: farthest from zero is ")).expect(&page);
+    let replay = page.lines().skip_while(|other| *other != line).nth(1).unwrap().trim();
+    let cycle = line.split("cycle ").nth(1).unwrap().split(' ').next().unwrap();
+    assert!(
+        replay.starts_with("isodp replay scene.toml --seed ") && replay.ends_with(&format!(" --cycle {cycle}")),
+        "{replay}"
+    );
+    let words = shell_words(replay);
+    let seed = words.iter().skip_while(|word| *word != "--seed").nth(1).unwrap();
+    let sets = words.iter().zip(words.iter().skip(1)).filter(|(word, _)| *word == "--run-set");
+    let mut call = vec!["run", "scene.toml", "--seed", seed, "--set", "record.rows=100000"];
+    sets.for_each(|(_, set)| call.extend(["--set", set.as_str()]));
+    room.runs(&call);
+    let slaves = table(&room.path("out/scene/slaves.csv"));
+    let row = slaves.iter().find(|row| row["cycle"] == cycle && row["slave"] == "4").expect("the cycle is recorded");
+    let value = line.split("zero is ").nth(1).unwrap().split(' ').next().unwrap();
+    assert!((number(&row["pll_error_ns"]) - number(value)).abs() < 0.01, "{row:?} {line}");
+}
+
+/// The words of a call, as a shell reads them that knows no more than single quotes.
+fn shell_words(line: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    for (number, part) in line.split('\'').enumerate() {
+        if number % 2 == 1 {
+            words.last_mut().unwrap().push_str(part);
+            continue;
+        }
+        for (number, piece) in part.split(' ').enumerate() {
+            if number > 0 {
+                words.push(String::new());
+            }
+            words.last_mut().unwrap().push_str(piece);
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+#[test]
 fn results_are_the_same_for_any_number_of_threads() {
     let room = room();
     for threads in ["1", "2", "4"] {
         room.runs(&["sweep", "jitter.toml", "--threads", threads, "--out", threads]);
     }
     let of = |threads| files(&room.path(threads));
-    assert_eq!(of("1").len(), 5 + 3 * 5, "plan, journal, lock, two tables, three pictures of five figures");
+    let expected = 5 + 3 * 5 + 3 * 2;
+    assert_eq!(of("1").len(), expected, "plan, journal, lock, two tables; pictures of five figures; two pools");
     assert_eq!(of("1"), of("2"));
     assert_eq!(of("1"), of("4"));
 }
@@ -416,11 +480,11 @@ fn whatever_a_scenario_says_its_runs_are_known_again() {
 fn pictures_show_figures_against_and_over_parameters() {
     let room = room();
     room.runs(&["sweep", "jitter.toml"]);
-    for kind in ["curve", "heat", "cumulative"] {
-        let text = fs::read_to_string(room.path(&format!("out/jitter/{kind}_latch_skew_p99.svg"))).expect("a picture");
+    for kind in ["curve_latch_skew_p99", "heat_latch_skew_p99", "cumulative_latch_skew_p99", "tail_latch_skew"] {
+        let text = fs::read_to_string(room.path(&format!("out/jitter/{kind}.svg"))).expect("a picture");
         let document = roxmltree::Document::parse(&text).expect("an SVG");
         let words: Vec<_> = document.descendants().filter_map(|node| node.text()).map(str::trim).collect();
-        assert!(words.iter().any(|text| text.contains("latch_skew.p99")), "{kind}: {words:?}");
+        assert!(words.iter().any(|text| text.contains("latch_skew")), "{kind}: {words:?}");
         assert!(words.iter().any(|text| text.contains("sweep jitter of scene.toml, 12 runs")), "{kind}: {words:?}");
     }
 }
@@ -444,6 +508,22 @@ fn wrong_sweep_files_are_told_with_place_and_remedy() {
   4 | figures = ["latch_skew.p99", "falts", "slave.max.lock_time", "slave.3.in_operation", "slave.4.pll_error.max"]
     |                              ^^^^^^^
   help: did you mean "faults"?
+"#,
+    );
+    refused(
+        ("\"slave.4.pll_error\"]", "\"slave.max.pll_error\"]"),
+        r#"error: jitter.toml:5:23: pool: "slave.max.pll_error" is a quantity of several, and a pool is that of one
+  5 | pool = ["latch_skew", "slave.max.pll_error"]
+    |                       ^^^^^^^^^^^^^^^^^^^^^
+  help: name one of them, such as "slave.3.pll_error"
+"#,
+    );
+    refused(
+        ("\"slave.4.pll_error\"]", "\"slave.9.pll_error\"]"),
+        r#"error: jitter.toml:5:23: pool: this network has no slave 9
+  5 | pool = ["latch_skew", "slave.9.pll_error"]
+    |                       ^^^^^^^^^^^^^^^^^^^
+  help: it has slave 3, 4, 5
 "#,
     );
     refused(

@@ -1,4 +1,4 @@
-//! Measure: a run of which only figures are wanted, many times over: no files, no pictures, no fingerprint.
+//! Measure: a run of which only figures and pools are wanted, many times over: no files, no pictures, no fingerprint.
 
 use super::build;
 use super::episode::Episodes;
@@ -6,6 +6,7 @@ use super::event_budget::{EventBudget, NoHeadway};
 use super::figure::{Figure, Figures};
 use super::histogram::Histograms;
 use super::metric::Metrics;
+use super::pool::Pools;
 use super::row::{CycleRow, EventRow, LinkRow, Sink, SlaveRow};
 use super::run::{Progress, Speeds, episodes, layout, steady_state};
 use super::scenario::Scenario;
@@ -47,13 +48,13 @@ impl Sink for Kept {
     }
 }
 
-/// Runs `scenario`, for the figures `wanted` besides those that it expects something of. The memory of `used`, if there is
-/// any, serves again. `go_on` is told the progress now and then and tells whether the run goes on; none if it did not.
+/// Runs `scenario`, for the figures `wanted` besides those that it expects something of, and fills `pools`. The memory of
+/// `used`, if there is any, serves again. `go_on` is told the progress now and then and tells whether the run goes on; none if it did not.
 ///
 /// # Errors
 /// The run makes no headway.
 pub fn measure<Q: Queue<NetworkEvent>>(
-    wanted: &[Figure],
+    (wanted, pools): (&[Figure], &mut Pools),
     scenario: &Scenario,
     used: Option<Histograms>,
     go_on: impl FnMut(Progress) -> bool,
@@ -69,13 +70,13 @@ pub fn measure<Q: Queue<NetworkEvent>>(
     let expected = scenario.expectations.iter().map(|expectation| &expectation.figure);
     let asked = wanted.iter().chain(expected).any(Figure::is_of_steady_state);
     let steady = if asked { steady_state(scenario, &layout) } else { None };
-    let sinks = Kept { steady, histograms, episodes: episodes(scenario, &layout) };
+    let sinks = (Kept { steady, histograms, episodes: episodes(scenario, &layout) }, pools);
     let mut metrics = Metrics::new(layout, Speeds::of(scenario), sinks);
     let mut network: Network<Node, Q> = build::network(scenario);
     if !EventBudget::of(scenario).run_while(&mut network, scenario, &mut metrics, go_on)? {
         return Ok(None);
     }
-    let (counts, Kept { steady, histograms, mut episodes }) = metrics.finish(network.now());
+    let (counts, (Kept { steady, histograms, mut episodes }, _)) = metrics.finish(network.now());
     episodes.finish(network.now());
     Ok(Some(Figures::new(counts, histograms, episodes).with_steady_state(steady)))
 }

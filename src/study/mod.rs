@@ -26,6 +26,7 @@ pub mod measure;
 pub mod metric;
 pub mod plan;
 pub mod plot;
+pub mod pool;
 pub mod quantity;
 pub mod replay;
 pub mod report;

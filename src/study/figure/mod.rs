@@ -44,7 +44,7 @@ use core::cmp::Ordering;
 
 use super::count::Counts;
 use super::episode::Episodes;
-use super::histogram::{self, Histograms};
+use super::histogram::{self, Histograms, Quantity};
 use super::layout::Layout;
 use super::steady::SteadyState;
 use name::What;
@@ -178,6 +178,16 @@ impl Figures {
             (family::Of::Acyclic(of), Subject::Acyclic(class)) => of(self.counts.acyclic.of(class)),
             _ => None,
         }
+    }
+}
+
+impl Figure {
+    /// The quantity that it is a statistic of, and whose; no subject where it is one of several. None if it is no
+    /// statistic of a quantity, or one of the steady state.
+    pub fn distribution(&self) -> Option<(&'static Quantity, Option<histogram::Subject>)> {
+        let What::Distribution(quantity, _) = self.what else { return None };
+        let subject = if let Who::One(subject) = self.who() { recorded(subject) } else { None };
+        Some((quantity, subject))
     }
 }
 

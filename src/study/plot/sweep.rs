@@ -4,10 +4,12 @@
 mod cumulative;
 mod curves;
 mod heat;
+mod tail;
 
 pub use cumulative::{Cumulative, Steps};
 pub use curves::{Curve, Curves, Point};
 pub use heat::{Cell, Heat};
+pub use tail::Tail;
 
 /// What every picture says about the sweep.
 #[derive(Clone, PartialEq, Eq, Debug)]

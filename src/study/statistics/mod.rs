@@ -12,6 +12,7 @@ pub mod bisection;
 pub mod confidence;
 pub mod interval;
 pub mod normal;
+pub mod pool;
 pub mod probability;
 pub mod quantile;
 pub mod sequential;

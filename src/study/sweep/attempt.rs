@@ -10,6 +10,7 @@ use crate::sim::queue::NearQueue;
 use crate::study::figure::{Figure, Figures};
 use crate::study::histogram::Histograms;
 use crate::study::measure::measure;
+use crate::study::pool::Pools;
 use crate::study::scenario::Scenario;
 
 thread_local! {
@@ -21,13 +22,13 @@ pub fn is_at_work() -> bool {
     AT_WORK.get()
 }
 
-/// Runs `scenario` for the figures `wanted` and expected, in the memory of `used`, if there is any, as long as `go_on` says
-/// yes; none if it did not.
+/// Runs `scenario` for the figures `wanted` and expected and for `pools`, in the memory of `used`, if there is any, as long
+/// as `go_on` says yes; none if it did not.
 ///
 /// # Errors
 /// The run makes no headway, or the model breaks off.
 pub(in crate::study) fn attempt(
-    wanted: &[Figure],
+    (wanted, pools): (&[Figure], &mut Pools),
     scenario: &Scenario,
     used: Option<Histograms>,
     go_on: impl Fn() -> bool,
@@ -36,7 +37,7 @@ pub(in crate::study) fn attempt(
     AT_WORK.set(true);
     // What the run has touched is thrown away where it fails.
     let measured = catch_unwind(AssertUnwindSafe(|| {
-        measure::<NearQueue<NetworkEvent>>(wanted, scenario, used, |progress| {
+        measure::<NearQueue<NetworkEvent>>((wanted, pools), scenario, used, |progress| {
             cycle = progress.cycles.saturating_sub(1);
             go_on()
         })

@@ -10,6 +10,7 @@ use super::definition::Definition;
 use super::journal::{Failure, JournalError};
 use super::picture::Gallery;
 use super::plan::{Base, Job, Plan, directory};
+use super::pooled::Pooling;
 use super::results::Results;
 use super::row::Gathered;
 use super::shard::Shard;
@@ -125,7 +126,7 @@ pub fn sweep(call: &Call, stop: &AtomicBool, watch: impl FnMut(Progress)) -> Res
         let left = left(&plan, call.shard, &store)?.count_ones(..);
         return Ok(Answer { page: page::stopped(&plan, call, before + done, left), end: End::Stopped });
     }
-    store.sort(&plan.definition.figure_names())?;
+    store.sort(&plan.definition.wanted())?;
     let failed = failures(&plan, call.shard, &store)?;
     let concluded = if call.shard.is_all() { Some(conclude(&plan, &store)?) } else { None };
     let counts = page::Counts { before, done };
@@ -206,6 +207,7 @@ fn failures(plan: &Plan, shard: Shard, store: &Store) -> Result<Failures, SweepE
 fn conclude(plan: &Plan, store: &Store) -> Result<page::Concluded, SweepError> {
     let mut results = Results::create(store.dir(), plan)?;
     let mut summary = Summary::create(store.dir(), plan)?;
+    let mut pooling = Pooling::create(store.dir(), plan)?;
     let (mut never, mut gallery) = (NeverSeen::new(plan), Gallery::new(plan));
     for combination in 0..plan.fates.len() as u64 {
         let mut gathered = Gathered::new(&plan.definition, combination);
@@ -216,11 +218,14 @@ fn conclude(plan: &Plan, store: &Store) -> Result<page::Concluded, SweepError> {
         }
         if let Some(row) = gathered.finish(gallery.outlines(combination)).map_err(StoreError::Temporary)? {
             summary.add(&row)?;
+            pooling.add(&row)?;
             never.add(&row);
             gallery.add(row);
         }
     }
+    let worst = pooling.worst();
     let mut files = vec![results.finish()?, summary.finish()?];
+    files.extend(pooling.finish()?);
     for (name, text) in gallery.draw()? {
         let mut file = Staged::create(store.dir(), &name)?;
         file.write_all(text.as_bytes()).map_err(|error| file.error(error))?;
@@ -228,5 +233,5 @@ fn conclude(plan: &Plan, store: &Store) -> Result<page::Concluded, SweepError> {
     }
     let placed = Staged::place_all(files)?;
     let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
-    Ok(page::Concluded { files: placed.iter().filter_map(name).collect(), never: never.told() })
+    Ok(page::Concluded { files: placed.iter().filter_map(name).collect(), never: never.told(), worst })
 }

@@ -5,6 +5,7 @@
 //! repetitions = 20                     # runs of each combination
 //! draws = "independent"                # or "common": repetition n of every combination has the same seed
 //! figures = ["latch_skew.p99", "faults"]
+//! pool = ["latch_skew", "slave.3.pll_error"]   # quantities of which every value of every cycle is kept
 //! confidence = "95 %"                  # of the intervals in summary.csv
 //! until = { figure = "latch_skew.p99", relative_half_width = "2 %", max_repetitions = 200 }
 //! expect = "all"                       # or "own": of the scenario's expectations only those that this file sets count
@@ -32,8 +33,10 @@ use std::path::{Path, PathBuf};
 
 use super::axis::Axis;
 use super::combination::Combinations;
+use super::journal::Wanted;
 use super::skip::Skip;
 use crate::study::figure::{Figure, Unit, Who};
+use crate::study::pool::Pooled;
 use crate::study::quantity::Measure;
 use crate::study::scenario::error::{Fault, ScenarioError};
 use crate::study::scenario::section::{Reader, Section, number, suggestion, text};
@@ -65,6 +68,8 @@ pub struct Definition {
     pub draws: Draws,
     /// What is collected of each run.
     pub figures: Vec<Figure>,
+    /// Quantities whose values of all repetitions of a combination become one distribution.
+    pub pools: Vec<Pooled>,
     /// Confidence of intervals.
     pub confidence: Confidence,
     /// When a combination has enough runs; without it [`Self::repetitions`] are enough.
@@ -73,7 +78,7 @@ pub struct Definition {
     pub expect: Expect,
     /// What becomes of combinations that break a rule.
     pub invalid: Invalid,
-    /// Where each figure is written.
+    /// Where each figure is written, then each pool.
     places: Vec<Place>,
 }
 
@@ -154,13 +159,19 @@ impl Definition {
     pub fn base_path(&self) -> PathBuf {
         Path::new(&self.source).parent().unwrap_or(Path::new("")).join(&self.base)
     }
-    /// Names of the figures.
-    pub fn figure_names(&self) -> Vec<String> {
-        self.figures.iter().map(|figure| figure.name().to_owned()).collect()
+    /// What the record of a run must have.
+    pub fn wanted(&self) -> Wanted {
+        let figures = self.figures.iter().map(|figure| figure.name().to_owned()).collect();
+        Wanted { figures, pools: self.pools.iter().map(|pooled| pooled.name().to_owned()).collect() }
     }
-    /// `fault` of this figure.
-    pub(super) fn wrong_figure(&self, figure: usize, fault: Fault) -> ScenarioError {
-        self.wrong(self.places[figure], "figures", fault)
+    /// What a network must have to be any use: the figures, then one of each pool.
+    pub(super) fn asked(&self) -> impl Iterator<Item = &Figure> {
+        self.figures.iter().chain(self.pools.iter().map(Pooled::figure))
+    }
+    /// `fault` of what is asked, by its number.
+    pub(super) fn wrong_asked(&self, number: usize, fault: Fault) -> ScenarioError {
+        let key = if number < self.figures.len() { "figures" } else { "pool" };
+        self.wrong(self.places[number], key, fault)
     }
     /// `fault` of the file as a whole.
     pub(super) fn wrong_file(&self, fault: Fault) -> ScenarioError {
@@ -188,6 +199,7 @@ fn read(reader: &mut Reader<'_>, mut section: Section<'_>) -> Option<Definition>
     let repetitions = s.optional(reader, "repetitions", number(1..=MOST_REPETITIONS)).unwrap_or(1);
     let draws = s.optional(reader, "draws", one_of(["independent", "common"], [Draws::Independent, Draws::Common]));
     let figures = figures(s, reader);
+    let pools = pools(s, reader);
     let confidence = s.optional(reader, "confidence", confidence).unwrap_or(Confidence::USUAL);
     let expected = s.optional(reader, "expect", one_of(["all", "own"], [Expect::All, Expect::Own]));
     let invalid = s.optional(reader, "invalid", one_of(["fail", "skip"], [Invalid::Fail, Invalid::Skip]));
@@ -198,7 +210,9 @@ fn read(reader: &mut Reader<'_>, mut section: Section<'_>) -> Option<Definition>
         reader.complain(Place::Missing, "", fault);
     }
     section.finish(reader);
-    let (figures, places) = figures?.into_iter().unzip();
+    let (figures, mut places): (Vec<_>, Vec<_>) = figures?.into_iter().unzip();
+    let (pools, of_pools): (Vec<_>, Vec<_>) = pools.into_iter().unzip();
+    places.extend(of_pools);
     Some(Definition {
         name: String::new(),
         source: String::new(),
@@ -210,6 +224,7 @@ fn read(reader: &mut Reader<'_>, mut section: Section<'_>) -> Option<Definition>
         repetitions,
         draws: draws.unwrap_or(Draws::Independent),
         figures,
+        pools,
         confidence,
         until,
         expect: expected.unwrap_or(Expect::All),
@@ -362,6 +377,27 @@ fn figure(node: &Node, others: &[(Figure, Place)]) -> Result<Figure, Fault> {
         return Err(Fault::new(format!("\"{name}\" is there twice")));
     }
     Ok(figure)
+}
+
+/// `pool = [...]`, each with its place; nothing if it is not there.
+fn pools(s: &mut Section<'_>, reader: &mut Reader<'_>) -> Vec<(Pooled, Place)> {
+    let items = s.optional(reader, "pool", |node| match &node.value {
+        Value::List(items) => Ok(items.clone()),
+        other => Err(Fault::new(format!("this is {}", other.noun())).help("write pool = [\"latch_skew\"]")),
+    });
+    let mut pools: Vec<(Pooled, Place)> = Vec::new();
+    for item in items.unwrap_or_default() {
+        let named = text(&item)
+            .and_then(|name| Pooled::named(name.trim()).map_err(|error| Fault::new(error.message).help(error.help)));
+        match named {
+            Ok(pooled) if pools.iter().any(|(other, _)| *other == pooled) => {
+                reader.complain(item.place, "pool", Fault::new(format!("\"{}\" is there twice", pooled.name())));
+            }
+            Ok(pooled) => pools.push((pooled, item.place)),
+            Err(fault) => reader.complain(item.place, "pool", fault),
+        }
+    }
+    pools
 }
 
 /// `"95 %"` or `0.95`.

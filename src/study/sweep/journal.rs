@@ -21,6 +21,7 @@ use super::key::RunKey;
 use crate::sim::fingerprint::Digest;
 use crate::study::figure::Value;
 use crate::study::statistics::aggregate::text;
+use crate::study::statistics::pool::Pool;
 
 /// What one run came to.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -33,6 +34,9 @@ pub struct Record {
     /// Its figures by name, exact, as far as they have a value; nothing if it failed.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub figures: BTreeMap<String, Option<Value>>,
+    /// Its pools by name, empty where the network lacks the quantity; nothing if it failed.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub pools: BTreeMap<String, Pool>,
     /// The figures whose expectations do not hold; none if the scenario expects nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub broken: Option<Vec<String>>,
@@ -41,7 +45,27 @@ pub struct Record {
     pub failure: Option<Failure>,
 }
 
+/// What a record must have to be good: all these figures and pools.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Wanted {
+    /// Names of figures.
+    pub figures: Vec<String>,
+    /// Names of pools.
+    pub pools: Vec<String>,
+}
+
+impl Wanted {
+    fn are_in(&self, record: &Record) -> bool {
+        self.figures.iter().all(|name| record.figures.contains_key(name))
+            && self.pools.iter().all(|name| record.pools.contains_key(name))
+    }
+}
+
 impl Record {
+    /// The record of this run with nothing in it yet.
+    pub const fn new(key: RunKey, seed: u64) -> Self {
+        Self { key, seed, figures: BTreeMap::new(), pools: BTreeMap::new(), broken: None, failure: None }
+    }
     /// What became of the run, in a word.
     pub const fn status(&self) -> &'static str {
         match (&self.failure, &self.broken) {
@@ -92,12 +116,12 @@ const LONGEST: u64 = 16 << 20;
 const BUFFER: usize = 1 << 18;
 
 impl Journal {
-    /// Opens the journal at `path`, or begins it. A record counts as good if it has all `figures`.
+    /// Opens the journal at `path`, or begins it. A record counts as good if it has all that is `wanted`.
     ///
     /// # Errors
     /// The file cannot be opened, read or cut.
-    pub fn open(path: &Path, figures: &[String]) -> Result<Self, JournalError> {
-        let (journal, length) = Self::with(path, File::options().read(true).append(true).create(true), figures)?;
+    pub fn open(path: &Path, wanted: &Wanted) -> Result<Self, JournalError> {
+        let (journal, length) = Self::with(path, File::options().read(true).append(true).create(true), wanted)?;
         if length > journal.end {
             let cut = journal.file.set_len(journal.end);
             cut.map_err(|source| journal.error("cut the torn end of", source))?;
@@ -108,20 +132,20 @@ impl Journal {
     ///
     /// # Errors
     /// The file cannot be opened or read.
-    pub fn look(path: &Path, figures: &[String]) -> Result<Self, JournalError> {
-        Ok(Self::with(path, File::options().read(true), figures)?.0)
+    pub fn look(path: &Path, wanted: &Wanted) -> Result<Self, JournalError> {
+        Ok(Self::with(path, File::options().read(true), wanted)?.0)
     }
-    fn with(path: &Path, options: &OpenOptions, figures: &[String]) -> Result<(Self, u64), JournalError> {
+    fn with(path: &Path, options: &OpenOptions, wanted: &Wanted) -> Result<(Self, u64), JournalError> {
         let error = |what| move |source| JournalError { what, path: path.to_owned(), source };
         let file = options.open(path).map_err(error("open"))?;
         let lines = lines(&file).map_err(error("read"))?;
         let index = Index::new(lines).map_err(error("index"))?;
         let mut journal = Self { path: path.to_owned(), file, end: 0, index, damaged: 0 };
-        let length = journal.scan(figures).map_err(error("read"))?;
+        let length = journal.scan(wanted).map_err(error("read"))?;
         Ok((journal, length))
     }
     /// Reads every line; returns the length of the file, torn end included.
-    fn scan(&mut self, figures: &[String]) -> io::Result<u64> {
+    fn scan(&mut self, wanted: &Wanted) -> io::Result<u64> {
         let mut reader = BufReader::with_capacity(BUFFER, &self.file);
         let mut line = Vec::new();
         let mut at = 0;
@@ -134,7 +158,7 @@ impl Journal {
             let whole = line.ends_with(b"\n");
             match parse(&line) {
                 Some(record) if whole => {
-                    let good = record.failure.is_none() && figures.iter().all(|name| record.figures.contains_key(name));
+                    let good = record.failure.is_none() && wanted.are_in(&record);
                     self.index.insert(record.key, Entry { at, length: length as u32, good })?;
                 }
                 _ if whole => self.damaged += 1,
@@ -274,13 +298,13 @@ mod tests {
     fn record(number: u128) -> Record {
         let figures = [("faults", Value::Count(3)), ("latch_skew.p99", Value::Span(Span::from_ns(441)))];
         let figures = figures.into_iter().map(|(name, value)| (name.to_owned(), Some(value))).collect();
-        Record { key: key(number), seed: 7, figures, broken: Some(Vec::new()), failure: None }
+        Record { figures, broken: Some(Vec::new()), ..Record::new(key(number), 7) }
     }
     fn has(journal: &Journal, number: u128) -> bool {
         journal.has(key(number)).unwrap()
     }
-    fn names() -> Vec<String> {
-        vec!["faults".to_owned()]
+    fn names() -> Wanted {
+        Wanted { figures: vec!["faults".to_owned()], pools: Vec::new() }
     }
     fn filled(path: &Path, numbers: &[u128]) {
         let mut journal = Journal::open(path, &names()).unwrap();
@@ -347,16 +371,19 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("journal.jsonl");
         let failure = Some(Failure { reason: "why".to_owned(), cycle: 4 });
-        let failed = Record { figures: BTreeMap::new(), broken: None, failure, ..record(1) };
+        let failed = Record { failure, ..Record::new(key(1), 7) };
         let mut journal = Journal::open(&path, &names()).unwrap();
         journal.append(&failed).unwrap();
         journal.append(&record(2)).unwrap();
         assert_eq!((has(&journal, 1), journal.get(key(1)).unwrap()), (false, Some(failed)));
         journal.append(&record(1)).unwrap();
         assert!(has(&journal, 1));
-        let more = ["faults", "retries"].map(str::to_owned);
-        let journal = Journal::open(&path, &more).unwrap();
-        assert!(!has(&journal, 1) && !has(&journal, 2));
+        let more = ["faults", "retries"].map(str::to_owned).to_vec();
+        let pools = vec!["latch_skew".to_owned()];
+        for wanted in [Wanted { figures: more, ..names() }, Wanted { pools, ..names() }] {
+            let journal = Journal::open(&path, &wanted).unwrap();
+            assert!(!has(&journal, 1) && !has(&journal, 2));
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Merge: the parts of a sweep become one. In which order, in how many steps and how often a part is named does not
 //! matter: what comes of it is, octet by octet, what one call for the whole sweep leaves.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::journal::Record;
@@ -60,7 +61,7 @@ pub(super) fn merge(out: &Path, parts: &[PathBuf]) -> Result<(Plan, Store), Merg
             }
         }
     }
-    store.sort(&plan.definition.figure_names())?;
+    store.sort(&plan.definition.wanted())?;
     plan.extend(&store.journal).map_err(StoreError::from)?;
     Ok((plan, store))
 }
@@ -72,7 +73,7 @@ fn same(one: Option<&PathBuf>, plan: &Plan, other: &Path, other_plan: &Plan) -> 
     if same { Ok(()) } else { Err(MergeError::OtherSweep(one.cloned().unwrap_or_default(), other.to_owned())) }
 }
 
-/// What is known of a run that two parts know: figures of both, and figures rather than a failure. None if that is what
+/// What is known of a run that two parts know: figures and pools of both, and figures rather than a failure. None if that is what
 /// is `known` already, an error if they disagree.
 fn joined(known: Option<&Record>, new: &Record) -> Result<Option<Record>, ()> {
     let Some(known) = known else { return Ok(Some(new.clone())) };
@@ -83,11 +84,17 @@ fn joined(known: Option<&Record>, new: &Record) -> Result<Option<Record>, ()> {
         (None, None) => {}
     }
     let mut both = known.clone();
-    for (name, value) in &new.figures {
-        if both.figures.get(name).is_some_and(|known| known != value) {
+    join(&mut both.figures, &new.figures)?;
+    join(&mut both.pools, &new.pools)?;
+    Ok((both != *known).then_some(both))
+}
+
+/// Adds what is `new` to what is `known`; an error if they disagree.
+fn join<T: Clone + PartialEq>(known: &mut BTreeMap<String, T>, new: &BTreeMap<String, T>) -> Result<(), ()> {
+    for (name, value) in new {
+        if known.entry(name.clone()).or_insert_with(|| value.clone()) != value {
             return Err(());
         }
-        both.figures.insert(name.clone(), *value);
     }
-    Ok((both != *known).then_some(both))
+    Ok(())
 }

@@ -25,6 +25,7 @@ mod page;
 pub mod parameter;
 mod picture;
 pub mod plan;
+mod pooled;
 pub(super) mod results;
 mod row;
 mod sample;

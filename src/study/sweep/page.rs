@@ -5,7 +5,8 @@ use std::path::Path;
 
 use super::command::{Call, Failures};
 use super::journal::{Journal, JournalError};
-use super::plan::{Base, Plan};
+use super::plan::{Base, Job, Plan};
+use super::pooled::Worst;
 use super::shard::Shard;
 use super::summary::Never;
 use crate::study::report::number;
@@ -22,12 +23,18 @@ pub(super) struct Concluded {
     pub(super) files: Vec<String>,
     /// Counts that were never above 0.
     pub(super) never: Vec<Never>,
+    /// Where pooled quantities were farthest from zero.
+    pub(super) worst: Vec<Worst>,
 }
 
 impl Concluded {
-    /// Where the files are; what was never seen is no less possible for it.
-    fn text(&self, plan: &Plan, dir: &Path) -> String {
+    /// Where the files are and what was farthest from zero; what was never seen is no less possible for it.
+    fn text(&self, plan: &Plan, base: &str, dir: &Path) -> String {
         let mut text = String::new();
+        for Worst { name, value, job, cycle } in &self.worst {
+            let _ = writeln!(text, "{name}: farthest from zero is {value}, in cycle {cycle} of run {}", job.key);
+            let _ = writeln!(text, "    {}", replay(plan, base, *job, *cycle));
+        }
         for Never { figure, combinations, runs, bound } in &self.never {
             let (all, confidence) = (plan.combinations_to_run(), plan.definition.confidence);
             let _ = writeln!(
@@ -119,7 +126,7 @@ pub(super) fn done(
         None => {
             let _ = writeln!(page, "\nthis part is in {}; isodp merge OUT PART... joins all parts", dir.display());
         }
-        Some(concluded) => page += &concluded.text(plan, dir),
+        Some(concluded) => page += &concluded.text(plan, failed.base, dir),
     }
     page
 }
@@ -139,7 +146,7 @@ pub(super) fn merged(
         None => {
             let _ = writeln!(page, "\n{left} runs are in none of the parts; what there is is in {}", dir.display());
         }
-        Some(concluded) => page += &concluded.text(plan, dir),
+        Some(concluded) => page += &concluded.text(plan, failed.base, dir),
     }
     page
 }
@@ -196,11 +203,7 @@ impl Failed<'_> {
         let mut text = String::new();
         for (job, failure) in &self.failures.first {
             let reason = failure.reason.lines().next().unwrap_or_default();
-            let _ = write!(text, "  failed: {reason}\n    isodp replay {} --seed {}", shell(self.base), job.seed);
-            for (key, value) in plan.sets(job.combination) {
-                let _ = write!(text, " --run-set {}", shell(&format!("{key}={value}")));
-            }
-            let _ = writeln!(text, " --cycle {}", failure.cycle);
+            let _ = writeln!(text, "  failed: {reason}\n    {}", replay(plan, self.base, *job, failure.cycle));
         }
         let more = self.failures.count - self.failures.first.len();
         if more > 0 {
@@ -208,6 +211,15 @@ impl Failed<'_> {
         }
         text
     }
+}
+
+/// The call that shows a cycle of a run again.
+fn replay(plan: &Plan, base: &str, job: Job, cycle: u64) -> String {
+    let mut text = format!("isodp replay {} --seed {}", shell(base), job.seed);
+    for (key, value) in plan.sets(job.combination) {
+        let _ = write!(text, " --run-set {}", shell(&format!("{key}={value}")));
+    }
+    text + &format!(" --cycle {cycle}")
 }
 
 /// Keys and values of a combination on one line.

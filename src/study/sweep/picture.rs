@@ -5,14 +5,18 @@
 //! | `curve_<figure>.svg` | an axis has several values: the one with the most, numbers first, is from left to right |
 //! | `heat_<figure>.svg` | exactly two axes have several values |
 //! | `cumulative_<figure>.svg` | combinations have several repetitions |
+//! | `tail_<quantity>.svg` | a quantity is pooled and has values |
 
 use super::parameter::Column;
 use super::plan::{Fate, Plan};
+use super::pooled::file_name;
 use super::row::Row;
 use super::sample::Sample;
 use super::store::StoreError;
-use crate::study::figure::Figure;
-use crate::study::plot::sweep::{Cell, Cumulative, Curve, Curves, Heat, Parameter, Point, Sheet, Steps};
+use crate::study::figure::Unit;
+use crate::study::histogram::Quantity;
+use crate::study::plot::sweep::{Cell, Cumulative, Curve, Curves, Heat, Parameter, Point, Sheet, Steps, Tail};
+use crate::study::pool::Pooled;
 use crate::study::statistics::interval::Interval;
 
 /// Most rows and columns of a heat map that can still be told apart.
@@ -37,6 +41,8 @@ pub(super) struct Gallery<'a> {
     outlined: Vec<u64>,
     /// Per figure.
     distributions: Vec<Vec<Steps>>,
+    /// Per pooled quantity.
+    tails: Vec<Vec<Steps>>,
 }
 
 impl<'a> Gallery<'a> {
@@ -47,7 +53,8 @@ impl<'a> Gallery<'a> {
         let count = run.len().min(Cumulative::MOST);
         let outlined = (0..count).map(|part| run[part * (run.len() - 1) / (count.max(2) - 1)]).collect();
         let distributions = vec![Vec::new(); plan.definition.figures.len()];
-        Self { plan, told: vec![None; plan.fates.len()], outlined, distributions }
+        let tails = vec![Vec::new(); plan.definition.pools.len()];
+        Self { plan, told: vec![None; plan.fates.len()], outlined, distributions, tails }
     }
     /// Whether the distributions of this combination are drawn.
     pub(super) fn outlines(&self, combination: u64) -> bool {
@@ -59,9 +66,19 @@ impl<'a> Gallery<'a> {
         let mean = |sample: &Sample<'_>| (sample.moments.mean(), sample.moments.interval().map(bounds));
         let means = row.samples.iter().map(mean).collect();
         self.told[row.combination as usize] = Some(Told { means, bad: row.failed + row.broken > 0 });
-        if self.outlines(row.combination) {
-            for (all, sample) in self.distributions.iter_mut().zip(row.samples) {
-                all.push(Steps { label: label(self.plan, row.combination, None), points: sample.outline });
+        if !self.outlines(row.combination) {
+            return;
+        }
+        let label = label(self.plan, row.combination, None);
+        for (all, sample) in self.distributions.iter_mut().zip(row.samples) {
+            all.push(Steps { label: label.clone(), points: sample.outline });
+        }
+        for ((all, pool), pooled) in self.tails.iter_mut().zip(row.pools).zip(&self.plan.definition.pools) {
+            let (unit, count) = (Unit::from(pooled.quantity().unit), pool.values().count() as f64);
+            let point = |(magnitude, above): (u64, u64)| (unit.of_grains(magnitude as f64), above as f64 / count);
+            let points: Vec<_> = pool.exceeded().into_iter().map(point).collect();
+            if !points.is_empty() {
+                all.push(Steps { label: label.clone(), points });
             }
         }
     }
@@ -71,9 +88,16 @@ impl<'a> Gallery<'a> {
     /// The library fails.
     pub(super) fn draw(self) -> Result<Vec<(String, String)>, StoreError> {
         let mut pictures = Vec::new();
-        let Self { plan, told, distributions, .. } = self;
+        let Self { plan, told, distributions, tails, .. } = self;
+        for (pooled, steps) in plan.definition.pools.iter().zip(tails).filter(|(_, steps)| !steps.is_empty()) {
+            let file = format!("tail_{}.svg", file_name(pooled));
+            let drawn = tail(plan, pooled, steps).draw();
+            let text = drawn.map_err(|reason| StoreError::Plot { file: file.clone(), reason })?;
+            pictures.push((file, text));
+        }
         for (number, (figure, steps)) in plan.definition.figures.iter().zip(distributions).enumerate() {
-            let of_figure = OfFigure { plan, told: &told, number, sheet: sheet(plan, figure) };
+            let sheet = sheet(plan, figure.name(), figure.unit());
+            let of_figure = OfFigure { plan, told: &told, number, sheet };
             let cumulative = of_figure.cumulative(steps);
             let drawn = [
                 ("curve", of_figure.curves().map(|curves| curves.draw())),
@@ -93,12 +117,18 @@ impl<'a> Gallery<'a> {
     }
 }
 
-fn sheet(plan: &Plan, figure: &Figure) -> Sheet {
+fn tail(plan: &Plan, pooled: &Pooled, steps: Vec<Steps>) -> Tail {
+    let Quantity { unit, signed, .. } = *pooled.quantity();
+    let sheet = sheet(plan, pooled.name(), unit.into());
+    Tail { sheet, signed, steps, of: plan.combinations_to_run() }
+}
+
+fn sheet(plan: &Plan, figure: &str, unit: Unit) -> Sheet {
     Sheet {
         sweep: plan.definition.name.clone(),
         base: plan.definition.base.clone(),
-        figure: figure.name().to_owned(),
-        unit: figure.unit().text().to_owned(),
+        figure: figure.to_owned(),
+        unit: unit.text().to_owned(),
         runs: plan.jobs().count() as u64,
         confidence: plan.definition.confidence.to_string(),
     }

@@ -106,8 +106,8 @@ pub struct Job {
 struct Look {
     fate: Fate,
     work: u64,
-    /// Which of the wanted figures its network has.
-    figures: Vec<bool>,
+    /// Which of what is asked its network has.
+    has: Vec<bool>,
     /// Why it is refused.
     error: Option<ScenarioError>,
 }
@@ -126,14 +126,14 @@ impl Plan {
         let seed = base.with(&definition.sets)?.run.seed;
         let count = definition.combinations().len() as usize;
         let (mut fates, mut work) = (vec![Fate::Skipped; count], vec![0; count]);
-        let mut known = vec![None; definition.figures.len()];
+        let mut known = vec![None; definition.asked().count()];
         let mut refused: Option<(usize, ScenarioError)> = None;
         let mut looked = 0;
         let look = |(): &mut (), number: usize| Some(look(&definition, base, number as u64));
         let take = |number: usize, look: Look| -> Result<(), std::convert::Infallible> {
             looked += 1;
             (fates[number], work[number]) = (look.fate, look.work);
-            known.iter_mut().zip(look.figures).for_each(|(known, is)| *known = Some(*known == Some(true) || is));
+            known.iter_mut().zip(look.has).for_each(|(known, is)| *known = Some(*known == Some(true) || is));
             if let Some(error) = look.error
                 && refused.as_ref().is_none_or(|&(first, _)| number < first)
             {
@@ -152,8 +152,8 @@ impl Plan {
         if plan.combinations_to_run() == 0 {
             return Err(plan.definition.wrong_file(Fault::new("every combination is left out")));
         }
-        if let Some(figure) = known.iter().position(|known| *known == Some(false)) {
-            return Err(plan.absent(figure, base));
+        if let Some(asked) = known.iter().position(|known| *known == Some(false)) {
+            return Err(plan.absent(asked, base));
         }
         Ok(Some(plan))
     }
@@ -304,19 +304,19 @@ impl Plan {
             }
         }
     }
-    /// No network of the sweep has the figure of this number.
-    fn absent(&self, figure: usize, base: &Base) -> ScenarioError {
+    /// No network of the sweep has what is asked under this number.
+    fn absent(&self, number: usize, base: &Base) -> ScenarioError {
         let first = self.fates.iter().position(|fate| matches!(fate, Fate::Run(_))).unwrap_or(0);
         let scenario = match base.with(&self.sets(first as u64)) {
             Ok(scenario) => scenario,
             Err(error) => return error,
         };
-        let wanted = &self.definition.figures[figure];
-        let fault = match wanted.check(&layout(&scenario)) {
-            Err(error) => Fault::new(error.message).help(error.help),
-            Ok(()) => Fault::new(format!("no combination has {}", wanted.name())),
+        let checked = self.definition.asked().nth(number).map(|asked| asked.check(&layout(&scenario)));
+        let fault = match checked {
+            Some(Err(error)) => Fault::new(error.message).help(error.help),
+            _ => Fault::new("no combination has it"),
         };
-        self.definition.wrong_figure(figure, fault)
+        self.definition.wrong_asked(number, fault)
     }
 }
 
@@ -329,9 +329,9 @@ fn sets(definition: &Definition, combination: u64) -> Vec<(String, String)> {
 /// Reads one combination.
 fn look(definition: &Definition, base: &Base, number: u64) -> Look {
     let values = definition.combinations().values(number);
-    let none = vec![false; definition.figures.len()];
+    let none = vec![false; definition.asked().count()];
     if definition.skips.iter().any(|skip| skip.leaves_out(&definition.axes, &values)) {
-        return Look { fate: Fate::Skipped, work: 0, figures: none, error: None };
+        return Look { fate: Fate::Skipped, work: 0, has: none, error: None };
     }
     match base.with(&sets(definition, number)) {
         Ok(scenario) => {
@@ -340,7 +340,7 @@ fn look(definition: &Definition, base: &Base, number: u64) -> Look {
             Look {
                 fate: Fate::Run(Identity::of(&scenario)),
                 work: cycles(&scenario).saturating_mul(stations),
-                figures: definition.figures.iter().map(|figure| figure.check(&layout).is_ok()).collect(),
+                has: definition.asked().map(|figure| figure.check(&layout).is_ok()).collect(),
                 error: None,
             }
         }
@@ -348,7 +348,7 @@ fn look(definition: &Definition, base: &Base, number: u64) -> Look {
             let first = &error.problems[0];
             let key = if first.key.is_empty() { String::new() } else { format!("{}: ", first.key) };
             let why = format!("{key}{}", first.fault.message);
-            Look { fate: Fate::Refused(why), work: 0, figures: none, error: Some(error) }
+            Look { fate: Fate::Refused(why), work: 0, has: none, error: Some(error) }
         }
     }
 }

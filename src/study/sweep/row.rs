@@ -5,6 +5,7 @@ use std::io;
 use super::definition::Definition;
 use super::journal::Record;
 use super::sample::{Gathering, Sample};
+use crate::study::statistics::pool::Pool;
 
 /// A combination whose repetitions are being looked at.
 pub(super) struct Gathered<'a> {
@@ -13,6 +14,7 @@ pub(super) struct Gathered<'a> {
     failed: u32,
     broken: u32,
     samples: Vec<Gathering<'a>>,
+    pools: Vec<Pool>,
 }
 
 /// What the repetitions of one combination came to.
@@ -24,6 +26,8 @@ pub(super) struct Row<'a> {
     pub(super) broken: u32,
     /// Per figure.
     pub(super) samples: Vec<Sample<'a>>,
+    /// All repetitions' values of each pooled quantity.
+    pub(super) pools: Vec<Pool>,
 }
 
 impl<'a> Gathered<'a> {
@@ -31,7 +35,8 @@ impl<'a> Gathered<'a> {
     pub(super) fn new(definition: &'a Definition, combination: u64) -> Self {
         let gathering = |figure| Gathering::new(figure, definition.confidence);
         let samples = definition.figures.iter().map(gathering).collect();
-        Self { combination, runs: 0, failed: 0, broken: 0, samples }
+        let pools = vec![Pool::default(); definition.pools.len()];
+        Self { combination, runs: 0, failed: 0, broken: 0, samples, pools }
     }
     /// Takes what a repetition came to.
     ///
@@ -46,6 +51,9 @@ impl<'a> Gathered<'a> {
                 sample.add(value, record.key)?;
             }
         }
+        for (all, pooled) in self.pools.iter_mut().zip(&definition.pools) {
+            record.pools.get(pooled.name()).into_iter().for_each(|pool| all.merge(pool));
+        }
         Ok(())
     }
     /// The row of all repetitions, with outlines of distributions if they are wanted; none without a repetition.
@@ -53,8 +61,8 @@ impl<'a> Gathered<'a> {
     /// # Errors
     /// A temporary file cannot be read.
     pub(super) fn finish(self, outline: bool) -> io::Result<Option<Row<'a>>> {
-        let Self { combination, runs, failed, broken, samples } = self;
+        let Self { combination, runs, failed, broken, samples, pools } = self;
         let samples = samples.into_iter().map(|sample| sample.finish(outline)).collect::<io::Result<_>>()?;
-        Ok((runs > 0).then_some(Row { combination, runs, failed, broken, samples }))
+        Ok((runs > 0).then_some(Row { combination, runs, failed, broken, samples, pools }))
     }
 }

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::definition::Definition;
-use super::journal::{Journal, JournalError};
+use super::journal::{Journal, JournalError, Wanted};
 use super::key::MODEL_VERSION;
 use super::plan::{Fate, Plan};
 use crate::study::export::{ExportError, Staged};
@@ -115,7 +115,7 @@ impl Store {
         let runs = dir.join(RUNS);
         fs::create_dir_all(&runs).map_err(|source| ExportError::Directory { path: runs.clone(), source })?;
         let lock = lock(&runs)?;
-        let journal = Journal::open(&runs.join(JOURNAL), &plan.definition.figure_names())?;
+        let journal = Journal::open(&runs.join(JOURNAL), &plan.definition.wanted())?;
         let written = Written {
             sweep: plan.definition.name.clone(),
             model: model(),
@@ -135,7 +135,7 @@ impl Store {
     /// It cannot be read.
     pub fn look(dir: &Path, plan: &Plan) -> Result<Option<Journal>, JournalError> {
         let path = dir.join(RUNS).join(JOURNAL);
-        if path.exists() { Journal::look(&path, &plan.definition.figure_names()).map(Some) } else { Ok(None) }
+        if path.exists() { Journal::look(&path, &plan.definition.wanted()).map(Some) } else { Ok(None) }
     }
     /// Whether `dir` holds a sweep.
     pub fn is_in(dir: &Path) -> bool {
@@ -170,7 +170,7 @@ impl Store {
     ///
     /// # Errors
     /// The new journal cannot be written; the old one stays.
-    pub fn sort(&mut self, figures: &[String]) -> Result<(), StoreError> {
+    pub fn sort(&mut self, wanted: &Wanted) -> Result<(), StoreError> {
         let runs = self.dir.join(RUNS);
         let mut file = BufWriter::new(Staged::create(&runs, JOURNAL)?);
         self.journal.sorted(&mut file)?;
@@ -178,7 +178,7 @@ impl Store {
             .into_inner()
             .map_err(|error| ExportError::Write { path: runs.join(JOURNAL), source: error.into_error() })?;
         file.place()?;
-        self.journal = Journal::open(&runs.join(JOURNAL), figures)?;
+        self.journal = Journal::open(&runs.join(JOURNAL), wanted)?;
         self.journal.sync()?;
         Ok(())
     }

@@ -9,6 +9,7 @@ use super::journal::{Failure, Record};
 use super::plan::{Base, Job, Plan};
 use crate::study::figure::{Figure, Figures, Value};
 use crate::study::histogram::Histograms;
+use crate::study::pool::Pools;
 use crate::study::scenario::Scenario;
 use crate::study::verdict::judge;
 
@@ -24,8 +25,7 @@ impl Worker {
     /// Does one run of `plan`. None if `stop` was set before its end.
     pub(super) fn run(&mut self, plan: &Plan, base: &Base, job: Job, stop: &AtomicBool) -> Option<Record> {
         let (key, seed) = (job.key, job.seed);
-        let failed =
-            |failure| Some(Record { key, seed, figures: BTreeMap::new(), broken: None, failure: Some(failure) });
+        let failed = |failure| Some(Record { failure: Some(failure), ..Record::new(key, seed) });
         if self.scenario.as_ref().is_none_or(|&(number, _)| number != job.combination) {
             match base.with(&plan.sets(job.combination)) {
                 Ok(scenario) => self.scenario = Some((job.combination, scenario)),
@@ -34,11 +34,14 @@ impl Worker {
         }
         let (_, scenario) = self.scenario.as_mut()?;
         scenario.run.seed = seed;
-        let figures = &plan.definition.figures;
-        match attempt(figures, scenario, self.histograms.take(), || !stop.load(Ordering::Relaxed)) {
+        let Definition { figures, pools: pooled, .. } = &plan.definition;
+        let mut pools = Pools::new(key, pooled);
+        match attempt((figures, &mut pools), scenario, self.histograms.take(), || !stop.load(Ordering::Relaxed)) {
             Ok(Some(figures)) => {
                 let broken = broken(scenario, &figures);
-                let record = Record { key, seed, figures: collect(&plan.definition, &figures), broken, failure: None };
+                let pools = pooled.iter().map(|pooled| pooled.name().to_owned()).zip(pools.into_pools()).collect();
+                let collected = collect(&plan.definition, &figures);
+                let record = Record { figures: collected, pools, broken, ..Record::new(key, seed) };
                 self.histograms = Some(figures.into_histograms());
                 Some(record)
             }
@@ -65,7 +68,7 @@ fn broken(scenario: &Scenario, figures: &Figures) -> Option<Vec<String>> {
 mod tests {
     use super::*;
     use crate::study::sweep::definition::Expect;
-    use crate::study::sweep::journal::Journal;
+    use crate::study::sweep::journal::{Journal, Wanted};
     use crate::study::sweep::plan::Fate;
 
     const SCENE: &str = "[run]\ncycles = 20\n[bus]\nrate = \"12 Mbit/s\"\n[master]\naddress = 1\nt_dp = \"1 ms\"\n\
@@ -112,11 +115,11 @@ mod tests {
             "repetitions = 10\nuntil = { figure = \"cycles\", relative_half_width = 0.01, max_repetitions = 40 }\n",
         );
         let dir = tempfile::tempdir().unwrap();
-        let mut journal = Journal::open(&dir.path().join("j"), &[]).unwrap();
+        let mut journal = Journal::open(&dir.path().join("j"), &Wanted::default()).unwrap();
         assert_eq!(plan.jobs().count(), 10);
         let append = |journal: &mut Journal, job: &Job, cycles| {
             let figures = [("cycles".to_owned(), Some(Value::Count(cycles)))].into();
-            let record = Record { key: job.key, seed: job.seed, figures, broken: None, failure: None };
+            let record = Record { figures, ..Record::new(job.key, job.seed) };
             journal.append(&record).unwrap();
         };
         let mut narrow = plan.clone();

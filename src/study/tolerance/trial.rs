@@ -8,6 +8,7 @@ use super::outcome::{Demand, Failing, Tried, Why};
 use super::scale::Scale;
 use crate::study::histogram::Histograms;
 use crate::study::invocation::Invocation;
+use crate::study::pool::Pools;
 use crate::study::scenario::{Scenario, ScenarioError};
 use crate::study::statistics::sequential::{
     SequentialError, SequentialSettings, SequentialTest, Tally, Tested, Verdict,
@@ -150,7 +151,7 @@ impl<'a> Trial<'a> {
 impl Worker {
     /// Does a run; none if it was broken off from outside.
     fn run(&mut self, go_on: impl Fn() -> bool) -> Option<Told> {
-        match attempt(&[], &self.scenario, self.histograms.take(), go_on) {
+        match attempt((&[], &mut Pools::none()), &self.scenario, self.histograms.take(), go_on) {
             Ok(Some(figures)) => {
                 let mut broken = judge(&self.scenario.expectations, &figures);
                 broken.retain(|verdict| !verdict.passed);
