@@ -6,7 +6,7 @@
 
 use crate::study::quantity::Measure;
 use crate::study::scenario::error::Fault;
-use crate::study::statistics::bisection::{Axis, SearchError};
+use crate::study::statistics::bisection::Axis;
 use crate::study::sweep::axis::{distance, like, measured, too_fine};
 
 /// Most values of a grid. Model: halving them takes 40 values to try.
@@ -165,7 +165,7 @@ impl Scale {
 /// step of its kind where values are `whole`.
 fn round(fine: f64, like: Measure, whole: bool) -> Result<Measure, Fault> {
     /// Decimals of the finest.
-    const DECIMALS: i32 = 12;
+    const DECIMALS: i32 = 15;
     let first = libm::floor(libm::log10(fine.max(1e-30))) as i32;
     for exponent in (-DECIMALS..=first).rev() {
         for digit in [5_u8, 2, 1] {
@@ -177,22 +177,20 @@ fn round(fine: f64, like: Measure, whole: bool) -> Result<Measure, Fault> {
             let step = Measure::read(format!("{number} {}", like.unit).trim());
             let fits = |step: &Measure| step.value() <= fine * (1.0 + 1e-9) && (!whole || step.steps().1 == 1);
             if let Some(step) = step.filter(fits) {
-                return Ok(step);
+                // Written as the ends are.
+                return like.with_steps(step.steps()).ok_or_else(too_fine);
             }
         }
     }
     if whole {
         like.with_steps((1, 1)).ok_or_else(too_fine)
     } else {
-        measured(&format!("0.000000000001 {}", like.unit))
+        measured(&format!("0.000000000000001 {}", like.unit))
     }
 }
 
 impl Axis for &Scale {
     type Value = i64;
-    fn check(&self, _: i64, _: i64, _: i64) -> Result<(), SearchError> {
-        Ok(())
-    }
     fn neighbours(&self, a: i64, b: i64) -> bool {
         let (x, y) = (self.value(a), self.value(b));
         a.abs_diff(b) <= 1 || (x - y).abs() <= self.resolution * x.abs().max(y.abs())
