@@ -389,6 +389,25 @@ fn shares_are_searched_with_an_exponent() {
 }
 
 #[test]
+fn between_whole_numbers_are_fractions_where_the_key_takes_some() {
+    let room = room(LOSS);
+    for (key, from, to, step) in [
+        ("slave.3.pll.kp", "1", "0", "0.001"),
+        ("disturbance.1.rate", "0", "1", "0.001"),
+        ("slave.#1.max_life_failures", "1", "9", "1"),
+    ] {
+        let call = Call {
+            expects: vec!["cycles >= 1".to_owned()],
+            sets: vec![set("run.cycles", "30")],
+            probes: 0,
+            ..call(&room, key, from, to)
+        };
+        let (page, json) = found(&call, End::Found);
+        assert_eq!((&json["step"], &json["answer"]), (&step.into(), &"everywhere".into()), "{page}");
+    }
+}
+
+#[test]
 fn a_search_begins_with_the_scenarios_own_value_where_it_has_one() {
     let room = room("");
     let own = |vary: &str, to: &str| Call {

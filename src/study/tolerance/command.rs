@@ -178,14 +178,21 @@ fn write(outcome: &Outcome, dir: &std::path::Path) -> Result<Vec<String>, Tolera
     Ok(names.into())
 }
 
-/// `scale`, or a coarser one where the scenario takes the value next to the beginning on that alone.
+/// `scale`; a finer one where the scenario takes fractions between whole ends, or a coarser one where it takes the value next
+/// to the beginning on that alone.
 fn taken(base: &Base, sets: &[(String, String)], key: &str, scale: Scale) -> Scale {
     let takes = |scale: &Scale, number| {
         let mut sets = sets.to_vec();
         sets.push((key.to_owned(), scale.text(number)));
         base.with(&sets).is_ok()
     };
-    if !takes(&scale, 0) || takes(&scale, 1) {
+    if !takes(&scale, 0) {
+        return scale;
+    }
+    if let Some(finer) = scale.finer().filter(|finer| takes(finer, 1)) {
+        return finer;
+    }
+    if takes(&scale, 1) {
         return scale;
     }
     let coarser = scale.coarser().find(|coarser| takes(coarser, 1));
