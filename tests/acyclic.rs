@@ -329,7 +329,18 @@ fn a_response_timeout_shorter_than_a_turn_is_warned_of() {
     );
     for name in crate::support::shipped() {
         let warned = isodp::study::plan::rules::warnings(&scenario(&name, &[])).join("\n");
-        assert!(!warned.contains("may give a request up"), "{name}: {warned}");
+        assert!(!warned.contains("may give a request up") && !warned.contains("over MS2"), "{name}: {warned}");
+    }
+}
+
+#[test]
+fn a_t_tr_that_leaves_no_time_for_ms2_is_warned_of() {
+    // 8 ms are 96000 t_bit.
+    for (t_tr, warns) in [("96000 tbit", true), ("120000 tbit", false)] {
+        let (run, warned) = reads_all(100, 1, &[("master.t_dp", "8 ms"), ("bus.t_tr", t_tr)]);
+        let words = "leaves the class 2 master 1 no time for any request over MS2; T_TR > T_DP = 96000 tbit: ";
+        assert_eq!(warned.contains(words), warns, "{t_tr}: {warned}");
+        assert_eq!((timed_out(&run, 1).len() > 5, values(&run, 1).is_empty()), (warns, warns), "{t_tr}");
     }
 }
 

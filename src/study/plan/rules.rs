@@ -105,6 +105,7 @@ pub static SERVICES: &[Rule] = &[
 pub static ACYCLIC: &[Rule] = &[
     Rule::warning("octets of a record <= C1_Max_Data_Len, C2_Max_Data_Len", "GSD", services::acyclic_lengths),
     Rule::warning("C2_Response_Timeout > n x T_DP", "Model: all slaves busy", services::class2_turns),
+    Rule::warning("T_TR > T_DP where MS2 is used", "EN 50170-2", services::class2_time).clocked(),
 ];
 /// T_I, T_O and the window of every slave.
 pub static INSTANTS: &[Rule] = &[

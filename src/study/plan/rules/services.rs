@@ -6,7 +6,7 @@ use crate::device::tool::Work;
 use crate::dp::ms2::TIMEOUT_UNIT;
 use crate::study::plan::finding::{Amount, Key, Relation};
 use crate::study::scenario::{Action, Class2, Fault, Scenario, Slave};
-use crate::time::Span;
+use crate::time::{Span, Tbit};
 use crate::wire::Address;
 use crate::wire::parameter::Format;
 
@@ -142,5 +142,23 @@ pub(super) fn class2_turns(facts: &Facts<'_>, found: &mut Findings) {
             .help(format!("response_timeout = \"{enough}\" or more, more messages per_token, or fewer slaves"))
         });
         found.of("C2_Response_Timeout", Some(Amount::Time(enough)));
+    }
+}
+
+/// Whoever asks over MS2 does so with low priority, and so in T_TH alone, which is what T_TR leaves of a rotation. The
+/// token comes to each station once in T_DP.
+pub(super) fn class2_time(facts: &Facts<'_>, found: &mut Findings) {
+    let (scenario, bus) = (facts.scenario, &facts.scenario.bus.params);
+    let t_dp = scenario.master.t_dp;
+    for class2 in scenario.class2.iter().filter(|class2| asked(scenario, class2).is_some()) {
+        let bound = Tbit(t_dp.ceil_to(bus.rate.bit()).div_floor(bus.rate.bit()) as u32);
+        found.check(Key::bus("t_tr"), bus.t_tr, Relation::MoreThan, ("T_DP", bound), || {
+            Fault::new(format!(
+                "T_TR = {} leaves the class 2 master {} no time for any request over MS2",
+                bus.t_tr, class2.address
+            ))
+            .rule(format!("T_TR > T_DP = {bound}: T_TH = T_TR - T_RR, and the token takes T_DP (EN 50170-2)"))
+            .help("a longer t_tr")
+        });
     }
 }
