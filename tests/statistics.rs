@@ -201,13 +201,13 @@ fn a_sequential_test_with_a_limit_ends_there() {
 
 #[test]
 fn repetitions_end_when_the_interval_is_narrow_enough() {
-    let settings = StopSettings { relative: 0.05, floor: 0.0, confidence: Confidence::USUAL, least: 20, most: 10_000 };
+    let settings = StopSettings { relative: 0.05, floor: 0.0, least: 20, most: 10_000 };
     let rule = StopRule::new(settings).unwrap();
     let mut stream = draws(40);
     let mut runs = 0;
     let held = share(1_000, || {
         let mut values = Aggregate::default();
-        while rule.next_for_mean(&values) == Next::GoOn {
+        while rule.next(values.count(), values.mean_interval(Confidence::USUAL)) == Next::GoOn {
             let run = RunKey(values.count().into());
             values.add(5 * 12_000 + normal(&mut stream), Place { run, cycle: 0 });
         }

@@ -71,6 +71,31 @@ impl Unit {
     }
 }
 
+/// Grains of a number of steps: billionths.
+const GRAINS_OF_A_STEP: f64 = 1e9;
+/// Grains of a whole: 10^15, as many digits as a share has.
+const GRAINS_OF_A_WHOLE: f64 = 1e15;
+
+/// Grains: whole numbers that values are added up as, so that the order does not matter. A tick of 1/12 ns, one of a
+/// count, a billionth of a step, 10^-15 of a share, 1 for true.
+impl Unit {
+    /// So many grains, or a fraction of one, as a number of this unit.
+    pub fn of_grains(self, grains: f64) -> f64 {
+        /// Ticks of a nanosecond.
+        const NS: f64 = Span::from_ns(1).ticks() as f64;
+        grains
+            / match self {
+                Self::Ns => NS,
+                Self::Us => NS * 1e3,
+                Self::Ms => NS * 1e6,
+                Self::S => NS * 1e9,
+                Self::Count | Self::Truth => 1.0,
+                Self::Steps => GRAINS_OF_A_STEP,
+                Self::Share => GRAINS_OF_A_WHOLE / 100.0,
+            }
+    }
+}
+
 impl From<histogram::Unit> for Unit {
     fn from(unit: histogram::Unit) -> Self {
         match unit {
@@ -127,6 +152,26 @@ impl Value {
             (Self::Truth(truth), _) => f64::from(u8::from(truth)),
         }
     }
+    /// The value in grains; beyond what an `i64` takes, its end.
+    pub fn grains(self) -> i64 {
+        match self {
+            Self::Span(span) => span.ticks(),
+            Self::Count(count) => i64::try_from(count).unwrap_or(i64::MAX),
+            Self::Steps(steps) => libm::round(steps * GRAINS_OF_A_STEP) as i64,
+            Self::Share(share) => libm::round(share * GRAINS_OF_A_WHOLE) as i64,
+            Self::Truth(truth) => truth.into(),
+        }
+    }
+    /// The value of a figure of `unit` that has so many grains.
+    pub fn of_grains(unit: Unit, grains: i64) -> Self {
+        match unit {
+            Unit::Ns | Unit::Us | Unit::Ms | Unit::S => Self::Span(Span::from_ticks(grains)),
+            Unit::Count => Self::Count(grains.unsigned_abs()),
+            Unit::Steps => Self::Steps(grains as f64 / GRAINS_OF_A_STEP),
+            Unit::Share => Self::Share(grains as f64 / GRAINS_OF_A_WHOLE),
+            Unit::Truth => Self::Truth(grains != 0),
+        }
+    }
     /// How two values of one kind compare; none for two kinds.
     pub fn compare(self, other: Self) -> Option<Ordering> {
         match (self, other) {
@@ -173,6 +218,20 @@ mod tests {
         let span = Value::Span(Span::from_us(1_500));
         let in_all = [Unit::Ns, Unit::Us, Unit::Ms, Unit::S].map(|unit| span.number(unit));
         assert_eq!(in_all.to_vec(), [1_500_000.0, 1_500.0, 1.5, 0.001_5]);
+    }
+
+    #[test]
+    fn grains_lose_nothing() {
+        let units = [Unit::Us, Unit::Count, Unit::Steps, Unit::Share, Unit::Truth];
+        for (value, unit) in VALUES.into_iter().zip(units) {
+            assert_eq!(Value::of_grains(unit, value.grains()), value);
+            let (number, expected) = (unit.of_grains(value.grains() as f64), value.number(unit));
+            assert!((number - expected).abs() < 1e-9, "{number} and {expected}");
+        }
+        assert_eq!(Value::Count(u64::MAX).grains(), i64::MAX);
+        // A third keeps as many digits as a share is told with.
+        let third = Value::of_grains(Unit::Share, Value::Share(1.0 / 3.0).grains());
+        assert_eq!(third.to_string(), "33.333 %");
     }
 
     #[test]

@@ -4,13 +4,19 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use fixedbitset::FixedBitSet;
+
 use super::definition::Definition;
 use super::journal::{Failure, JournalError};
+use super::picture::Gallery;
 use super::plan::{Base, Job, Plan, directory};
+use super::results::Results;
+use super::row::Gathered;
 use super::shard::Shard;
 use super::store::{Store, StoreError};
+use super::summary::{NeverSeen, Summary};
 use super::worker::Worker;
-use super::{crew, merge, page, picture, results, summary};
+use super::{crew, merge, page};
 use crate::study::export::{ExportError, Staged};
 use crate::study::scenario::ScenarioError;
 
@@ -84,11 +90,13 @@ impl From<ExportError> for SweepError {
     }
 }
 
-/// A run that failed.
-#[derive(Clone, Debug)]
-pub(super) struct Failed {
-    pub(super) job: Job,
-    pub(super) failure: Failure,
+/// The runs without figures, as far as they are named.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Failures {
+    /// How many there are.
+    pub(super) count: usize,
+    /// The first of them and why they failed.
+    pub(super) first: Vec<(Job, Failure)>,
 }
 
 /// Carries out `call`. `watch` is told after every run; when `stop` is set, runs are broken off and what is done is kept.
@@ -105,23 +113,24 @@ pub fn sweep(call: &Call, stop: &AtomicBool, watch: impl FnMut(Progress)) -> Res
     if call.plan {
         let journal = Store::look(&dir, &plan)?;
         journal.as_ref().map_or(Ok(()), |journal| plan.extend(journal))?;
-        return Ok(Answer { page: page::plan(&plan, &base, call, journal.as_ref()), end: End::Done });
+        return Ok(Answer { page: page::plan(&plan, &base, call, journal.as_ref())?, end: End::Done });
     }
     let mut store = Store::open(&dir, &plan)?;
     plan.extend(&store.journal)?;
-    let before = plan.jobs_of(call.shard).filter(|job| store.journal.has(job.key)).count();
+    let all = plan.jobs_of(call.shard).count();
+    let before = all - left(&plan, call.shard, &store)?.count_ones(..);
     let done = run(&mut plan, &base, call, &mut store, stop, watch)?;
     store.journal.sync()?;
     if stop.load(Ordering::Relaxed) {
-        let left = plan.jobs_of(call.shard).filter(|job| !store.journal.has(job.key)).count();
+        let left = left(&plan, call.shard, &store)?.count_ones(..);
         return Ok(Answer { page: page::stopped(&plan, call, before + done, left), end: End::Stopped });
     }
     store.sort(&plan.definition.figure_names())?;
     let failed = failures(&plan, call.shard, &store)?;
     let concluded = if call.shard.is_all() { Some(conclude(&plan, &store)?) } else { None };
     let counts = page::Counts { before, done };
-    let end = if failed.is_empty() { End::Done } else { End::Failed };
-    let lines = page::Failures { base: &base.source, failed: &failed };
+    let end = if failed.count == 0 { End::Done } else { End::Failed };
+    let lines = page::Failed { base: &base.source, failures: &failed };
     Ok(Answer { page: page::done(&plan, call.shard, counts, &lines, store.dir(), concluded.as_ref()), end })
 }
 
@@ -131,14 +140,11 @@ pub fn sweep(call: &Call, stop: &AtomicBool, watch: impl FnMut(Progress)) -> Res
 /// A directory holds no part of a sweep, they are not of one sweep, or the results cannot be written.
 pub fn join(out: &Path, parts: &[PathBuf]) -> Result<Answer, SweepError> {
     let (plan, store) = merge::merge(out, parts)?;
-    let mut left = 0;
-    for job in plan.jobs() {
-        left += usize::from(store.journal.get(job.key)?.is_none());
-    }
+    let left = plan.left(Shard::ALL, |job| Ok::<_, JournalError>(!store.journal.knows(job.key)?))?.count_ones(..);
     let failed = failures(&plan, Shard::ALL, &store)?;
     let concluded = if left == 0 { Some(conclude(&plan, &store)?) } else { None };
-    let end = if left > 0 || !failed.is_empty() { End::Failed } else { End::Done };
-    let lines = page::Failures { base: &plan.definition.base, failed: &failed };
+    let end = if left > 0 || failed.count > 0 { End::Failed } else { End::Done };
+    let lines = page::Failed { base: &plan.definition.base, failures: &failed };
     Ok(Answer { page: page::merged(&plan, parts.len(), left, &lines, store.dir(), concluded.as_ref()), end })
 }
 
@@ -152,13 +158,14 @@ fn run(
     mut watch: impl FnMut(Progress),
 ) -> Result<usize, SweepError> {
     let mut progress = Progress::default();
-    let mut jobs: Vec<_> = plan.jobs_of(call.shard).filter(|job| !store.journal.has(job.key)).collect();
-    while !jobs.is_empty() && !stop.load(Ordering::Relaxed) {
-        progress.runs += jobs.len();
+    let mut left = left(plan, call.shard, store)?;
+    while !left.is_clear() && !stop.load(Ordering::Relaxed) {
+        progress.runs += left.count_ones(..);
         watch(progress);
         let of_plan = &*plan;
-        let does = |worker: &mut Worker, number: usize| worker.run(of_plan, base, jobs[number], stop);
-        crew::share((call.threads, jobs.len()), stop, Worker::default, does, |_, record| {
+        let jobs = plan.jobs_of(call.shard).enumerate().filter(|&(number, _)| left.contains(number));
+        let does = |worker: &mut Worker, (_, job): (usize, Job)| worker.run(of_plan, base, job, stop);
+        crew::share((call.threads, jobs), stop, Worker::default, does, |_, record| {
             store.journal.append(&record)?;
             progress.done += 1;
             progress.failed += usize::from(record.failure.is_some());
@@ -167,33 +174,59 @@ fn run(
         })?;
         plan.extend(&store.journal)?;
         // What has failed just now fails again.
-        jobs = plan.jobs_of(call.shard).filter(|job| !store.journal.knows(job.key)).collect();
+        left = plan.left(call.shard, |job| Ok::<_, JournalError>(!store.journal.knows(job.key)?))?;
     }
     Ok(progress.done)
 }
 
-/// The runs without figures.
-fn failures(plan: &Plan, shard: Shard, store: &Store) -> Result<Vec<Failed>, SweepError> {
-    let mut failed = Vec::new();
-    for job in plan.jobs_of(shard).filter(|job| !store.journal.has(job.key)) {
-        if let Some(failure) = store.journal.get(job.key)?.and_then(|record| record.failure) {
-            failed.push(Failed { job, failure });
+/// Which runs of a part have no figures.
+fn left(plan: &Plan, shard: Shard, store: &Store) -> Result<FixedBitSet, JournalError> {
+    plan.left(shard, |job| Ok(!store.journal.has(job.key)?))
+}
+
+/// The runs without figures, the first ones with the reason.
+fn failures(plan: &Plan, shard: Shard, store: &Store) -> Result<Failures, SweepError> {
+    let left = left(plan, shard, store)?;
+    let mut failures = Failures::default();
+    for (_, job) in plan.jobs_of(shard).enumerate().filter(|&(number, _)| left.contains(number)) {
+        if !store.journal.knows(job.key)? {
+            continue;
+        }
+        failures.count += 1;
+        if failures.first.len() < page::NAMED
+            && let Some(failure) = store.journal.get(job.key)?.and_then(|record| record.failure)
+        {
+            failures.first.push((job, failure));
         }
     }
-    Ok(failed)
+    Ok(failures)
 }
 
 /// Writes the tables and the pictures.
 fn conclude(plan: &Plan, store: &Store) -> Result<page::Concluded, SweepError> {
-    let mut files =
-        vec![results::write(store.dir(), plan, &store.journal)?, summary::write(store.dir(), plan, &store.journal)?];
-    for (name, text) in picture::draw(plan, &store.journal)? {
+    let mut results = Results::create(store.dir(), plan)?;
+    let mut summary = Summary::create(store.dir(), plan)?;
+    let (mut never, mut gallery) = (NeverSeen::new(plan), Gallery::new(plan));
+    for combination in 0..plan.fates.len() as u64 {
+        let mut gathered = Gathered::new(&plan.definition, combination);
+        for job in plan.jobs_in(combination) {
+            let Some(record) = store.journal.get(job.key)? else { continue };
+            results.add(job, &record)?;
+            gathered.add(&plan.definition, &record).map_err(StoreError::Temporary)?;
+        }
+        if let Some(row) = gathered.finish(gallery.outlines(combination)).map_err(StoreError::Temporary)? {
+            summary.add(&row)?;
+            never.add(&row);
+            gallery.add(row);
+        }
+    }
+    let mut files = vec![results.finish()?, summary.finish()?];
+    for (name, text) in gallery.draw()? {
         let mut file = Staged::create(store.dir(), &name)?;
         file.write_all(text.as_bytes()).map_err(|error| file.error(error))?;
         files.push(file);
     }
     let placed = Staged::place_all(files)?;
     let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
-    let never = summary::never(plan, &store.journal)?;
-    Ok(page::Concluded { files: placed.iter().filter_map(name).collect(), never })
+    Ok(page::Concluded { files: placed.iter().filter_map(name).collect(), never: never.told() })
 }

@@ -1,7 +1,7 @@
 //! Crew: threads that share jobs out among themselves, one after the other, and hand in what they made.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, mpsc};
 use std::thread;
 
 /// Results that wait to be taken, per thread.
@@ -12,21 +12,22 @@ pub fn cores() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Does the jobs `0..jobs` on `threads` threads. Each thread makes itself a `worker`, which `does` its jobs; `take` gets
-/// what comes of them on the calling thread, in any order. Ends early when `stop` is set, when a worker makes nothing of
-/// its job, or when `take` fails.
+/// Does all `jobs` on `threads` threads, each of them next when a thread is free. Each thread makes itself a `worker`,
+/// which `does` its jobs; `take` gets what comes of them on the calling thread, in any order. Ends early when `stop` is
+/// set, when a worker makes nothing of its job, or when `take` fails.
 ///
 /// # Errors
 /// Whatever `take` says.
-pub(in crate::study) fn share<W, R: Send, E>(
-    (threads, jobs): (usize, usize),
+pub(in crate::study) fn share<W, J: Copy + Send, R: Send, E>(
+    (threads, jobs): (usize, impl Iterator<Item = J> + Send),
     stop: &AtomicBool,
     worker: impl Fn() -> W + Sync,
-    does: impl Fn(&mut W, usize) -> Option<R> + Sync,
-    mut take: impl FnMut(usize, R) -> Result<(), E>,
+    does: impl Fn(&mut W, J) -> Option<R> + Sync,
+    mut take: impl FnMut(J, R) -> Result<(), E>,
 ) -> Result<(), E> {
-    let (next, worker, does) = (&AtomicUsize::new(0), &worker, &does);
-    let threads = threads.clamp(1, jobs.max(1));
+    let most = jobs.size_hint().1.unwrap_or(usize::MAX);
+    let threads = threads.min(most).max(1);
+    let (jobs, worker, does) = (&Mutex::new(jobs), &worker, &does);
     thread::scope(|scope| {
         let (sender, receiver) = mpsc::sync_channel(threads * WAITING);
         for _ in 0..threads {
@@ -34,8 +35,9 @@ pub(in crate::study) fn share<W, R: Send, E>(
             scope.spawn(move || {
                 let mut worker = worker();
                 while !stop.load(Ordering::Relaxed) {
-                    let job = next.fetch_add(1, Ordering::Relaxed);
-                    let made = if job < jobs { does(&mut worker, job) } else { None };
+                    // Whoever finds the lock poisoned stops: the panic of the other thread is told when all have ended.
+                    let Some(job) = jobs.lock().ok().and_then(|mut jobs| jobs.next()) else { break };
+                    let made = does(&mut worker, job);
                     // Nobody takes it where taking has failed.
                     if made.is_none_or(|made| sender.send((job, made)).is_err()) {
                         break;
@@ -62,7 +64,7 @@ mod tests {
                 made[job] += 1;
                 Ok(())
             };
-            share((threads, 1_000), &AtomicBool::new(false), || (), |(), job| Some(job * 2), take).unwrap();
+            share((threads, 0..1_000), &AtomicBool::new(false), || (), |(), job| Some(job * 2), take).unwrap();
             assert!(made.iter().all(|&times| times == 1), "{threads} threads");
         }
     }
@@ -75,10 +77,10 @@ mod tests {
             taken += 1;
             if taken == 3 { Err("full") } else { Ok(()) }
         };
-        assert_eq!(share((2, 1_000_000), &stop, || (), |(), _| Some(()), take), Err("full"));
+        assert_eq!(share((2, 0..1_000_000), &stop, || (), |(), _| Some(()), take), Err("full"));
         assert_eq!(taken, 3);
         stop.store(true, Ordering::Relaxed);
         let take = |_, ()| -> Result<(), ()> { Err(()) };
-        assert_eq!(share((2, 1_000), &stop, || (), |(), _| Some(()), take), Ok(()));
+        assert_eq!(share((2, 0..1_000), &stop, || (), |(), _| Some(()), take), Ok(()));
     }
 }

@@ -117,7 +117,7 @@ pub enum Invalid {
 
 /// Most repetitions of a combination.
 pub const MOST_REPETITIONS: u32 = 1_000_000;
-/// Most runs of a sweep. Model: each needs some 150 octets of memory while the sweep runs.
+/// Most runs of a sweep. Model: a year of runs that take three seconds.
 pub const MOST_RUNS: u64 = 10_000_000;
 
 impl Definition {
@@ -191,7 +191,7 @@ fn read(reader: &mut Reader<'_>, mut section: Section<'_>) -> Option<Definition>
     let confidence = s.optional(reader, "confidence", confidence).unwrap_or(Confidence::USUAL);
     let expected = s.optional(reader, "expect", one_of(["all", "own"], [Expect::All, Expect::Own]));
     let invalid = s.optional(reader, "invalid", one_of(["fail", "skip"], [Invalid::Fail, Invalid::Skip]));
-    let until = until(s, reader, figures.as_deref().unwrap_or_default(), confidence, repetitions);
+    let until = until(s, reader, figures.as_deref().unwrap_or_default(), repetitions);
     let runs = Combinations::new(&axes).len().saturating_mul(repetitions.into());
     if runs > MOST_RUNS {
         let fault = Fault::new(format!("{runs} runs")).rule(format!("a sweep has at most {MOST_RUNS}"));
@@ -229,13 +229,7 @@ fn one_of<T: Copy>(words: [&'static str; 2], meanings: [T; 2]) -> impl Fn(&Node)
 }
 
 /// `until = { ... }`, if it is there.
-fn until(
-    s: &mut Section<'_>,
-    reader: &mut Reader<'_>,
-    figures: &[(Figure, Place)],
-    confidence: Confidence,
-    least: u32,
-) -> Option<Until> {
+fn until(s: &mut Section<'_>, reader: &mut Reader<'_>, figures: &[(Figure, Place)], least: u32) -> Option<Until> {
     let mut section = s.table(reader, "until")?;
     let s = &mut section;
     let names = || figures.iter().map(|(figure, _)| figure.name());
@@ -252,7 +246,7 @@ fn until(
     let path = s.path_of("relative_half_width");
     section.finish(reader);
     let (figure, relative, most) = (figure?, relative?, most?);
-    let settings = StopSettings { relative, floor, confidence, least: least.into(), most: most.into() };
+    let settings = StopSettings { relative, floor, least: least.into(), most: most.into() };
     let fault = |error: StopError| match error {
         StopError::Runs { .. } => Fault::new(format!("{least} repetitions and at most {most} are not in order"))
             .rule(format!("{LEAST} <= repetitions <= max_repetitions: of fewer runs hardly anything is known")),

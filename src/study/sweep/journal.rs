@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::index::{Entry, Index};
 use super::key::RunKey;
 use crate::sim::fingerprint::Digest;
 use crate::study::figure::Value;
@@ -65,23 +66,13 @@ pub struct Failure {
     pub cycle: u64,
 }
 
-/// Where a record is.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Entry {
-    at: u64,
-    /// Octets of the whole line.
-    length: u32,
-    /// Whether the run has its figures.
-    good: bool,
-}
-
 /// The journal of a sweep, open for more.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
     file: File,
     end: u64,
-    index: BTreeMap<RunKey, Entry>,
+    index: Index,
     /// Lines that were passed over.
     damaged: usize,
 }
@@ -97,6 +88,8 @@ pub struct JournalError {
 
 /// Longest line that is taken for one (octets): far more than any record has.
 const LONGEST: u64 = 16 << 20;
+/// What is read at once (octets).
+const BUFFER: usize = 1 << 18;
 
 impl Journal {
     /// Opens the journal at `path`, or begins it. A record counts as good if it has all `figures`.
@@ -121,13 +114,15 @@ impl Journal {
     fn with(path: &Path, options: &OpenOptions, figures: &[String]) -> Result<(Self, u64), JournalError> {
         let error = |what| move |source| JournalError { what, path: path.to_owned(), source };
         let file = options.open(path).map_err(error("open"))?;
-        let mut journal = Self { path: path.to_owned(), file, end: 0, index: BTreeMap::new(), damaged: 0 };
+        let lines = lines(&file).map_err(error("read"))?;
+        let index = Index::new(lines).map_err(error("index"))?;
+        let mut journal = Self { path: path.to_owned(), file, end: 0, index, damaged: 0 };
         let length = journal.scan(figures).map_err(error("read"))?;
         Ok((journal, length))
     }
     /// Reads every line; returns the length of the file, torn end included.
     fn scan(&mut self, figures: &[String]) -> io::Result<u64> {
-        let mut reader = BufReader::with_capacity(1 << 18, &self.file);
+        let mut reader = BufReader::with_capacity(BUFFER, &self.file);
         let mut line = Vec::new();
         let mut at = 0;
         loop {
@@ -140,7 +135,7 @@ impl Journal {
             match parse(&line) {
                 Some(record) if whole => {
                     let good = record.failure.is_none() && figures.iter().all(|name| record.figures.contains_key(name));
-                    self.index.insert(record.key, Entry { at, length: length as u32, good });
+                    self.index.insert(record.key, Entry { at, length: length as u32, good })?;
                 }
                 _ if whole => self.damaged += 1,
                 _ => {}
@@ -160,33 +155,37 @@ impl Journal {
         let line = line(record);
         self.file.write_all(&line).map_err(|source| self.error("write", source))?;
         let entry = Entry { at: self.end, length: line.len() as u32, good: record.failure.is_none() };
-        self.index.insert(record.key, entry);
+        self.index.insert(record.key, entry).map_err(|source| self.error("index", source))?;
         self.end += line.len() as u64;
         Ok(())
     }
     /// Whether this run has its figures.
-    pub fn has(&self, key: RunKey) -> bool {
-        self.index.get(&key).is_some_and(|entry| entry.good)
+    ///
+    /// # Errors
+    /// What was indexed cannot be read.
+    pub fn has(&self, key: RunKey) -> Result<bool, JournalError> {
+        Ok(self.entry(key)?.is_some_and(|entry| entry.good))
     }
     /// Whether this run has a record, be it one of its failure.
-    pub fn knows(&self, key: RunKey) -> bool {
-        self.index.contains_key(&key)
+    ///
+    /// # Errors
+    /// What was indexed cannot be read.
+    pub fn knows(&self, key: RunKey) -> Result<bool, JournalError> {
+        Ok(self.entry(key)?.is_some())
     }
     /// The last record of this run; none if there is none.
     ///
     /// # Errors
     /// The file cannot be read, or is not what it was any more.
     pub fn get(&self, key: RunKey) -> Result<Option<Record>, JournalError> {
-        let Some(entry) = self.index.get(&key) else { return Ok(None) };
-        let mut octets = vec![0; entry.length as usize];
-        let mut file = &self.file;
-        let read = file.seek(SeekFrom::Start(entry.at)).and_then(|_| file.read_exact(&mut octets));
-        let record = read.and_then(|()| parse(&octets).ok_or_else(|| io::ErrorKind::InvalidData.into()));
-        record.map(Some).map_err(|source| self.error("read", source))
+        self.entry(key)?.map(|entry| self.read(entry)).transpose()
     }
-    /// Every run that has a record, in order.
-    pub fn keys(&self) -> impl Iterator<Item = RunKey> {
-        self.index.keys().copied()
+    /// The last record of every run, in the order of their keys.
+    pub fn records(&self) -> impl Iterator<Item = Result<Record, JournalError>> {
+        self.index.iter().map(|told| {
+            let (_, entry) = told.map_err(|source| self.error("read the index of", source))?;
+            self.read(entry)
+        })
     }
     /// How many lines were passed over because they are damaged.
     pub fn damaged(&self) -> usize {
@@ -204,16 +203,35 @@ impl Journal {
     /// # Errors
     /// A record cannot be read, or `out` takes no more.
     pub fn sorted(&self, out: &mut impl Write) -> Result<(), JournalError> {
-        for key in self.keys() {
-            if let Some(record) = self.get(key)? {
-                out.write_all(&line(&record)).map_err(|source| self.error("copy", source))?;
-            }
+        for record in self.records() {
+            out.write_all(&line(&record?)).map_err(|source| self.error("copy", source))?;
         }
         Ok(())
+    }
+    fn entry(&self, key: RunKey) -> Result<Option<Entry>, JournalError> {
+        self.index.get(key).map_err(|source| self.error("read the index of", source))
+    }
+    fn read(&self, entry: Entry) -> Result<Record, JournalError> {
+        let mut octets = vec![0; entry.length as usize];
+        let mut file = &self.file;
+        let read = file.seek(SeekFrom::Start(entry.at)).and_then(|_| file.read_exact(&mut octets));
+        let record = read.and_then(|()| parse(&octets).ok_or_else(|| io::ErrorKind::InvalidData.into()));
+        record.map_err(|source| self.error("read", source))
     }
     fn error(&self, what: &'static str, source: io::Error) -> JournalError {
         JournalError { what, path: self.path.clone(), source }
     }
+}
+
+/// How many lines `file` has, a torn one included; it is read from its beginning again then.
+fn lines(mut file: &File) -> io::Result<u64> {
+    let mut reader = BufReader::with_capacity(BUFFER, file);
+    let mut lines = 0;
+    while reader.skip_until(b'\n')? > 0 {
+        lines += 1;
+    }
+    file.rewind()?;
+    Ok(lines)
 }
 
 /// The line of one record.
@@ -258,6 +276,9 @@ mod tests {
         let figures = figures.into_iter().map(|(name, value)| (name.to_owned(), Some(value))).collect();
         Record { key: key(number), seed: 7, figures, broken: Some(Vec::new()), failure: None }
     }
+    fn has(journal: &Journal, number: u128) -> bool {
+        journal.has(key(number)).unwrap()
+    }
     fn names() -> Vec<String> {
         vec!["faults".to_owned()]
     }
@@ -274,9 +295,10 @@ mod tests {
         let path = dir.path().join("journal.jsonl");
         filled(&path, &[5, 1, 3]);
         let mut journal = Journal::open(&path, &names()).unwrap();
-        assert_eq!(journal.keys().collect::<Vec<_>>(), [key(1), key(3), key(5)]);
+        let keys = journal.records().map(|record| record.unwrap().key).collect::<Vec<_>>();
+        assert_eq!(keys, [key(1), key(3), key(5)]);
         assert_eq!(journal.get(key(3)).unwrap(), Some(record(3)));
-        assert_eq!((journal.get(key(2)).unwrap(), journal.has(key(2)), journal.damaged()), (None, false, 0));
+        assert_eq!((journal.get(key(2)).unwrap(), has(&journal, 2), journal.damaged()), (None, false, 0));
         journal.append(&record(2)).unwrap();
         assert_eq!(journal.get(key(2)).unwrap(), Some(record(2)));
         for line in fs::read_to_string(&path).unwrap().lines() {
@@ -295,11 +317,11 @@ mod tests {
         for length in 0..whole.len() {
             fs::write(&path, &whole[..length]).unwrap();
             let mut journal = Journal::open(&path, &names()).unwrap();
-            assert_eq!((journal.has(key(1)), journal.has(key(2))), (length >= first, false), "{length} octets");
+            assert_eq!((has(&journal, 1), has(&journal, 2)), (length >= first, false), "{length} octets");
             assert_eq!(journal.damaged(), 0);
             journal.append(&record(2)).unwrap();
             drop(journal);
-            assert!(Journal::open(&path, &names()).unwrap().has(key(2)), "{length} octets");
+            assert!(has(&Journal::open(&path, &names()).unwrap(), 2), "{length} octets");
         }
     }
 
@@ -315,7 +337,7 @@ mod tests {
             octets[at] ^= 0x01;
             fs::write(&path, &octets).unwrap();
             let journal = Journal::open(&path, &names()).unwrap();
-            assert_eq!((journal.has(key(1)), journal.has(key(2))), (false, true), "octet {at}");
+            assert_eq!((has(&journal, 1), has(&journal, 2)), (false, true), "octet {at}");
             assert!(journal.damaged() > 0);
         }
     }
@@ -329,12 +351,12 @@ mod tests {
         let mut journal = Journal::open(&path, &names()).unwrap();
         journal.append(&failed).unwrap();
         journal.append(&record(2)).unwrap();
-        assert_eq!((journal.has(key(1)), journal.get(key(1)).unwrap()), (false, Some(failed)));
+        assert_eq!((has(&journal, 1), journal.get(key(1)).unwrap()), (false, Some(failed)));
         journal.append(&record(1)).unwrap();
-        assert!(journal.has(key(1)));
+        assert!(has(&journal, 1));
         let more = ["faults", "retries"].map(str::to_owned);
         let journal = Journal::open(&path, &more).unwrap();
-        assert!(!journal.has(key(1)) && !journal.has(key(2)));
+        assert!(!has(&journal, 1) && !has(&journal, 2));
     }
 
     #[test]

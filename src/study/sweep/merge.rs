@@ -50,13 +50,13 @@ pub(super) fn merge(out: &Path, parts: &[PathBuf]) -> Result<(Plan, Store), Merg
     let mut plan = read[0].1.0.clone();
     let mut store = Store::open(out, &plan)?;
     for (dir, (_, journal)) in &read {
-        for key in journal.keys() {
-            let Some(record) = journal.get(key).map_err(StoreError::from)? else { continue };
-            let known = store.journal.get(key).map_err(StoreError::from)?;
+        for record in journal.records() {
+            let record = record.map_err(StoreError::from)?;
+            let known = store.journal.get(record.key).map_err(StoreError::from)?;
             match joined(known.as_ref(), &record) {
                 Ok(None) => {}
                 Ok(Some(record)) => store.journal.append(&record).map_err(StoreError::from)?,
-                Err(()) => return Err(MergeError::Disagree { dir: (*dir).clone(), key }),
+                Err(()) => return Err(MergeError::Disagree { dir: (*dir).clone(), key: record.key }),
             }
         }
     }

@@ -10,12 +10,14 @@
 //! ended the sweep before and however its file has grown since. Tables are written from the journal in the order of the
 //! plan, so that they do not tell how many threads, calls or machines there were.
 
+mod ascending;
 mod attempt;
 pub mod axis;
 pub mod combination;
 pub mod command;
 pub mod crew;
 pub mod definition;
+mod index;
 pub mod journal;
 pub mod key;
 pub mod merge;
@@ -24,6 +26,8 @@ pub mod parameter;
 mod picture;
 pub mod plan;
 pub(super) mod results;
+mod row;
+mod sample;
 pub mod shard;
 pub mod skip;
 pub mod store;

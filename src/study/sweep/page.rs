@@ -3,8 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::command::{Call, Failed};
-use super::journal::Journal;
+use super::command::{Call, Failures};
+use super::journal::{Journal, JournalError};
 use super::plan::{Base, Plan};
 use super::shard::Shard;
 use super::summary::Never;
@@ -14,7 +14,7 @@ use crate::study::report::number;
 /// virtual AMD EPYC, see `benches/README.md`. It is an estimate before the first run, and nothing depends on it.
 const NS_PER_SLAVE_CYCLE: u64 = 400;
 /// Most failed runs and refused combinations that a page names.
-const NAMED: usize = 10;
+pub(super) const NAMED: usize = 10;
 
 /// The files of a sweep that is over, and what may not be taken for granted of them.
 #[derive(Default)]
@@ -52,14 +52,17 @@ pub(super) struct Counts {
 }
 
 /// What failed, and how to see it again.
-pub(super) struct Failures<'a> {
+pub(super) struct Failed<'a> {
     /// The scenario's file.
     pub(super) base: &'a str,
-    pub(super) failed: &'a [Failed],
+    pub(super) failures: &'a Failures,
 }
 
 /// The plan of `isodp sweep --plan`.
-pub(super) fn plan(plan: &Plan, base: &Base, call: &Call, journal: Option<&Journal>) -> String {
+///
+/// # Errors
+/// The journal cannot be read.
+pub(super) fn plan(plan: &Plan, base: &Base, call: &Call, journal: Option<&Journal>) -> Result<String, JournalError> {
     let mut page =
         format!("sweep {} of {}, model {}\n\n", plan.definition.name, base.source, env!("CARGO_PKG_VERSION"));
     for axis in &plan.definition.axes {
@@ -73,7 +76,7 @@ pub(super) fn plan(plan: &Plan, base: &Base, call: &Call, journal: Option<&Journ
         writeln!(page, "\n{:<32} {:<5} {:>5} {:>20} {:>12}  parameters", "run", "state", "rep", "seed", "slave-cycles");
     let (mut runs, mut done, mut work) = (0_u64, 0_u64, 0_u64);
     for job in plan.jobs_of(call.shard) {
-        let is_done = journal.is_some_and(|journal| journal.has(job.key));
+        let is_done = journal.map_or(Ok(false), |journal| journal.has(job.key))?;
         let cost = plan.work[job.combination as usize];
         (runs, done) = (runs + 1, done + u64::from(is_done));
         work = work.saturating_add(if is_done { 0 } else { cost });
@@ -89,7 +92,7 @@ pub(super) fn plan(plan: &Plan, base: &Base, call: &Call, journal: Option<&Journ
         "\n{} combinations to run, {runs} runs{part}, {done} of them done\nto do: {work} slave-cycles, about {seconds:.1} s on one core at {NS_PER_SLAVE_CYCLE} ns each",
         plan.combinations_to_run(),
     );
-    page
+    Ok(page)
 }
 
 /// The end of a sweep.
@@ -97,7 +100,7 @@ pub(super) fn done(
     plan: &Plan,
     shard: Shard,
     counts: Counts,
-    failures: &Failures<'_>,
+    failed: &Failed<'_>,
     dir: &Path,
     concluded: Option<&Concluded>,
 ) -> String {
@@ -109,9 +112,9 @@ pub(super) fn done(
         plan.combinations_to_run(),
         before + done,
         refused(plan),
-        failures.failed.len()
+        failed.failures.count
     );
-    page += &failures.text(plan);
+    page += &failed.text(plan);
     match concluded {
         None => {
             let _ = writeln!(page, "\nthis part is in {}; isodp merge OUT PART... joins all parts", dir.display());
@@ -126,12 +129,12 @@ pub(super) fn merged(
     plan: &Plan,
     parts: usize,
     left: usize,
-    failures: &Failures<'_>,
+    failed: &Failed<'_>,
     dir: &Path,
     concluded: Option<&Concluded>,
 ) -> String {
-    let mut page = format!("sweep {}: {parts} parts joined, {} failed\n", plan.definition.name, failures.failed.len());
-    page += &failures.text(plan);
+    let mut page = format!("sweep {}: {parts} parts joined, {} failed\n", plan.definition.name, failed.failures.count);
+    page += &failed.text(plan);
     match concluded {
         None => {
             let _ = writeln!(page, "\n{left} runs are in none of the parts; what there is is in {}", dir.display());
@@ -187,11 +190,11 @@ fn refused(plan: &Plan) -> String {
     text
 }
 
-impl Failures<'_> {
+impl Failed<'_> {
     /// Each with the call that shows it again.
     fn text(&self, plan: &Plan) -> String {
         let mut text = String::new();
-        for Failed { job, failure } in self.failed.iter().take(NAMED) {
+        for (job, failure) in &self.failures.first {
             let reason = failure.reason.lines().next().unwrap_or_default();
             let _ = write!(text, "  failed: {reason}\n    isodp replay {} --seed {}", shell(self.base), job.seed);
             for (key, value) in plan.sets(job.combination) {
@@ -199,8 +202,9 @@ impl Failures<'_> {
             }
             let _ = writeln!(text, " --cycle {}", failure.cycle);
         }
-        if self.failed.len() > NAMED {
-            let _ = writeln!(text, "  and {} more, see results.csv", self.failed.len() - NAMED);
+        let more = self.failures.count - self.failures.first.len();
+        if more > 0 {
+            let _ = writeln!(text, "  and {more} more, see results.csv");
         }
         text
     }

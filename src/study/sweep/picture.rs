@@ -6,13 +6,14 @@
 //! | `heat_<figure>.svg` | exactly two axes have several values |
 //! | `cumulative_<figure>.svg` | combinations have several repetitions |
 
-use super::journal::Journal;
 use super::parameter::Column;
 use super::plan::{Fate, Plan};
+use super::row::Row;
+use super::sample::Sample;
 use super::store::StoreError;
-use super::summary::{Sample, rows};
 use crate::study::figure::Figure;
 use crate::study::plot::sweep::{Cell, Cumulative, Curve, Curves, Heat, Parameter, Point, Sheet, Steps};
+use crate::study::statistics::interval::Interval;
 
 /// Most rows and columns of a heat map that can still be told apart.
 const CELLS: usize = 400;
@@ -28,49 +29,68 @@ struct Told {
     bad: bool,
 }
 
-/// Draws all pictures: the names of their files and their texts.
-///
-/// # Errors
-/// The journal cannot be read, or the library fails.
-pub(super) fn draw(plan: &Plan, journal: &Journal) -> Result<Vec<(String, String)>, StoreError> {
-    let mut told = vec![None; plan.fates.len()];
-    let run: Vec<u64> =
-        (0..).zip(&plan.fates).filter(|(_, fate)| matches!(fate, Fate::Run(_))).map(|(n, _)| n).collect();
-    let count = run.len().min(Cumulative::MOST);
-    let kept: Vec<u64> = (0..count).map(|part| run[part * (run.len() - 1) / (count.max(2) - 1)]).collect();
-    let mut distributions = vec![Vec::new(); plan.definition.figures.len()];
-    for row in rows(plan, journal) {
-        let row = row?;
-        let mean =
-            |sample: &Sample<'_>| (sample.mean(), sample.interval().map(|interval| (interval.low, interval.high)));
+/// What the pictures are drawn from, gathered combination by combination.
+pub(super) struct Gallery<'a> {
+    plan: &'a Plan,
+    told: Vec<Option<Told>>,
+    /// The combinations whose distributions are drawn.
+    outlined: Vec<u64>,
+    /// Per figure.
+    distributions: Vec<Vec<Steps>>,
+}
+
+impl<'a> Gallery<'a> {
+    /// Before any combination was looked at.
+    pub(super) fn new(plan: &'a Plan) -> Self {
+        let run = |fate: &Fate| matches!(fate, Fate::Run(_));
+        let run: Vec<u64> = (0..).zip(&plan.fates).filter(|(_, fate)| run(fate)).map(|(number, _)| number).collect();
+        let count = run.len().min(Cumulative::MOST);
+        let outlined = (0..count).map(|part| run[part * (run.len() - 1) / (count.max(2) - 1)]).collect();
+        let distributions = vec![Vec::new(); plan.definition.figures.len()];
+        Self { plan, told: vec![None; plan.fates.len()], outlined, distributions }
+    }
+    /// Whether the distributions of this combination are drawn.
+    pub(super) fn outlines(&self, combination: u64) -> bool {
+        self.outlined.contains(&combination)
+    }
+    /// Takes what a combination came to.
+    pub(super) fn add(&mut self, row: Row<'_>) {
+        let bounds = |interval: Interval| (interval.low, interval.high);
+        let mean = |sample: &Sample<'_>| (sample.moments.mean(), sample.moments.interval().map(bounds));
         let means = row.samples.iter().map(mean).collect();
-        told[row.combination as usize] = Some(Told { means, bad: row.failed + row.broken > 0 });
-        if kept.contains(&row.combination) {
-            for (all, sample) in distributions.iter_mut().zip(&row.samples) {
-                let label = label(plan, row.combination, None);
-                all.push(Steps { label, values: sample.numbers().collect() });
+        self.told[row.combination as usize] = Some(Told { means, bad: row.failed + row.broken > 0 });
+        if self.outlines(row.combination) {
+            for (all, sample) in self.distributions.iter_mut().zip(row.samples) {
+                all.push(Steps { label: label(self.plan, row.combination, None), points: sample.outline });
             }
         }
     }
-    let mut pictures = Vec::new();
-    for (number, (figure, steps)) in plan.definition.figures.iter().zip(distributions).enumerate() {
-        let of_figure = OfFigure { plan, told: &told, number, sheet: sheet(plan, figure) };
-        let cumulative = of_figure.cumulative(steps);
-        let drawn = [
-            ("curve", of_figure.curves().map(|curves| curves.draw())),
-            ("heat", of_figure.heat().map(|heat| heat.draw())),
-            ("cumulative", cumulative.map(|cumulative| cumulative.draw())),
-        ];
-        for (kind, drawn) in drawn {
-            let file = format!("{kind}_{}.svg", figure.name().replace('.', "_"));
-            match drawn {
-                None => {}
-                Some(Ok(text)) => pictures.push((file, text)),
-                Some(Err(reason)) => return Err(StoreError::Plot { file, reason }),
+    /// Draws all pictures: the names of their files and their texts.
+    ///
+    /// # Errors
+    /// The library fails.
+    pub(super) fn draw(self) -> Result<Vec<(String, String)>, StoreError> {
+        let mut pictures = Vec::new();
+        let Self { plan, told, distributions, .. } = self;
+        for (number, (figure, steps)) in plan.definition.figures.iter().zip(distributions).enumerate() {
+            let of_figure = OfFigure { plan, told: &told, number, sheet: sheet(plan, figure) };
+            let cumulative = of_figure.cumulative(steps);
+            let drawn = [
+                ("curve", of_figure.curves().map(|curves| curves.draw())),
+                ("heat", of_figure.heat().map(|heat| heat.draw())),
+                ("cumulative", cumulative.map(|cumulative| cumulative.draw())),
+            ];
+            for (kind, drawn) in drawn {
+                let file = format!("{kind}_{}.svg", figure.name().replace('.', "_"));
+                match drawn {
+                    None => {}
+                    Some(Ok(text)) => pictures.push((file, text)),
+                    Some(Err(reason)) => return Err(StoreError::Plot { file, reason }),
+                }
             }
         }
+        Ok(pictures)
     }
-    Ok(pictures)
 }
 
 fn sheet(plan: &Plan, figure: &Figure) -> Sheet {
@@ -152,8 +172,8 @@ impl OfFigure<'_> {
         Some(Heat { sheet: self.sheet.clone(), x: self.parameter(x), y: self.parameter(y), fails, cells })
     }
     fn cumulative(&self, steps: Vec<Steps>) -> Option<Cumulative> {
-        let steps: Vec<_> = steps.into_iter().filter(|steps| !steps.values.is_empty()).collect();
-        let several = steps.iter().any(|steps| steps.values.len() > 1);
+        let steps: Vec<_> = steps.into_iter().filter(|steps| !steps.points.is_empty()).collect();
+        let several = steps.iter().any(|steps| steps.points.len() > 1);
         several.then(|| Cumulative { sheet: self.sheet.clone(), steps, of: self.plan.combinations_to_run() })
     }
 }

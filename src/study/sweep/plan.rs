@@ -9,14 +9,15 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use fixedbitset::FixedBitSet;
 use serde::{Deserialize, Serialize};
 
 use super::crew;
 use super::definition::{Definition, Draws, Expect, Invalid, Until};
 use super::journal::{Journal, JournalError};
 use super::key::{Identity, RunKey};
+use super::sample::Moments;
 use super::shard::Shard;
-use super::summary::Sample;
 use crate::study::run::{cycles, layout};
 use crate::study::scenario::error::{Fault, Problem, ScenarioError};
 use crate::study::scenario::{Position, Scenario};
@@ -140,7 +141,7 @@ impl Plan {
             }
             Ok(())
         };
-        let Ok(()) = crew::share((threads, count), stop, || (), look, take);
+        let Ok(()) = crew::share((threads, 0..count), stop, || (), look, take);
         if looked < count {
             return Ok(None);
         }
@@ -174,9 +175,8 @@ impl Plan {
             let Fate::Run(identity) = self.fates[combination] else { continue };
             while !self.settled[combination] {
                 let count = self.repetitions[combination];
-                let Some(sample) = self.sample(until, combination as u64, identity, journal)? else { break };
-                let half_width = sample.interval().map(|interval| interval.half_width());
-                match until.rule.next(u64::from(count), sample.mean().unwrap_or(0.0), half_width) {
+                let Some(found) = self.moments(until, combination as u64, identity, journal)? else { break };
+                match until.rule.next(count.into(), found.interval()) {
                     Next::GoOn => self.repetitions[combination] = (count + (count / 4).max(1)).min(until.most),
                     Next::Enough | Next::GivenUp => self.settled[combination] = true,
                 }
@@ -184,22 +184,24 @@ impl Plan {
         }
         Ok(())
     }
-    /// The values of the stop rule's figure in all runs that were asked for; none if some are missing.
-    fn sample(
+    /// What the stop rule's figure comes to in all runs that were asked for; none if some are missing.
+    fn moments(
         &self,
         until: Until,
         combination: u64,
         identity: Identity,
         journal: &Journal,
-    ) -> Result<Option<Sample<'_>>, JournalError> {
+    ) -> Result<Option<Moments<'_>>, JournalError> {
         let figure = &self.definition.figures[until.figure];
-        let mut values = Vec::new();
+        let mut moments = Moments::new(figure, self.definition.confidence);
         for repetition in 1..=self.repetitions[combination as usize] {
             let job = self.job(combination, identity, repetition);
             let Some(record) = journal.get(job.key)? else { return Ok(None) };
-            values.extend(record.figures.get(figure.name()).copied().flatten());
+            if let Some(value) = record.figures.get(figure.name()).copied().flatten() {
+                moments.add(value, record.key);
+            }
         }
-        Ok(Some(Sample::new(figure, self.definition.confidence, values)))
+        Ok(Some(moments))
     }
     /// How many combinations are run.
     pub fn combinations_to_run(&self) -> usize {
@@ -218,13 +220,28 @@ impl Plan {
     }
     /// All runs, by combination, then by repetition.
     pub fn jobs(&self) -> impl Iterator<Item = Job> {
-        (0..).zip(&self.fates).flat_map(move |(combination, fate)| {
-            let identity = if let Fate::Run(identity) = fate { Some(*identity) } else { None };
-            let repetitions = self.repetitions[combination as usize];
-            identity.into_iter().flat_map(move |identity| {
-                (1..=repetitions).map(move |repetition| self.job(combination, identity, repetition))
-            })
+        (0..self.fates.len() as u64).flat_map(|combination| self.jobs_in(combination))
+    }
+    /// The runs of one combination; none if it is not run.
+    pub fn jobs_in(&self, combination: u64) -> impl Iterator<Item = Job> {
+        let identity = if let Fate::Run(identity) = self.fates[combination as usize] { Some(identity) } else { None };
+        let repetitions = self.repetitions[combination as usize];
+        identity.into_iter().flat_map(move |identity| {
+            (1..=repetitions).map(move |repetition| self.job(combination, identity, repetition))
         })
+    }
+    /// Which runs of a part are left for `is_left` to say: a bit for each, in the order of [`Self::jobs_of`].
+    ///
+    /// # Errors
+    /// Whatever `is_left` says.
+    pub fn left<E>(&self, shard: Shard, is_left: impl Fn(Job) -> Result<bool, E>) -> Result<FixedBitSet, E> {
+        let mut left = FixedBitSet::new();
+        for (number, job) in self.jobs_of(shard).enumerate() {
+            if is_left(job)? {
+                left.grow_and_insert(number);
+            }
+        }
+        Ok(left)
     }
     /// The runs of one part of the sweep.
     pub fn jobs_of(&self, shard: Shard) -> impl Iterator<Item = Job> {

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use csv::Writer;
 
 use super::definition::Definition;
-use super::journal::{Journal, Record};
+use super::journal::Record;
 use super::parameter::Column;
 use super::plan::{Job, Plan};
 use super::store::StoreError;
@@ -26,29 +26,53 @@ use crate::study::figure::{Figure, Unit, Value};
 /// File of the rows.
 const FILE: &str = "results.csv";
 
-/// Writes the results of all runs that are in the journal under a temporary name.
-///
-/// # Errors
-/// The file cannot be written or the journal not be read.
-pub(super) fn write(dir: &Path, plan: &Plan, journal: &Journal) -> Result<Staged, StoreError> {
-    let mut table = Table::create(dir, FILE)?;
-    let columns = Column::of(&plan.definition);
-    let names = columns.iter().map(|column| column.name.clone());
-    let figures = plan.definition.figures.iter().map(Figure::column);
-    let fixed = ["repetition", "seed", "status"].map(str::to_owned);
-    table.row(names.chain(fixed).chain(figures).chain(["run".to_owned()]))?;
-    let mut combination = None;
-    let mut cells = Vec::new();
-    for job in plan.jobs() {
-        let Some(record) = journal.get(job.key)? else { continue };
-        if combination != Some(job.combination) {
-            combination = Some(job.combination);
-            let values = plan.definition.combinations().values(job.combination);
-            cells = columns.iter().map(|column| column.cell(&plan.definition.axes, &values)).collect();
-        }
-        table.row(cells.iter().cloned().chain(row(&plan.definition, job, &record)))?;
+/// The table, under its temporary name.
+pub(super) struct Results<'a> {
+    plan: &'a Plan,
+    columns: Vec<Column>,
+    table: Table,
+    /// The combination of the last row and its cells.
+    last: Option<(u64, Vec<String>)>,
+}
+
+impl<'a> Results<'a> {
+    /// Begins it in `dir`.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(super) fn create(dir: &Path, plan: &'a Plan) -> Result<Self, StoreError> {
+        let mut table = Table::create(dir, FILE)?;
+        let columns = Column::of(&plan.definition);
+        let names = columns.iter().map(|column| column.name.clone());
+        let figures = plan.definition.figures.iter().map(Figure::column);
+        let fixed = ["repetition", "seed", "status"].map(str::to_owned);
+        table.row(names.chain(fixed).chain(figures).chain(["run".to_owned()]))?;
+        Ok(Self { plan, columns, table, last: None })
     }
-    table.finish()
+    /// Writes the row of a run.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(super) fn add(&mut self, job: Job, record: &Record) -> Result<(), StoreError> {
+        let definition = &self.plan.definition;
+        let cells = match self.last.take() {
+            Some((combination, cells)) if combination == job.combination => cells,
+            _ => {
+                let values = definition.combinations().values(job.combination);
+                self.columns.iter().map(|column| column.cell(&definition.axes, &values)).collect()
+            }
+        };
+        self.table.row(cells.iter().cloned().chain(row(definition, job, record)))?;
+        self.last = Some((job.combination, cells));
+        Ok(())
+    }
+    /// The whole file.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub(super) fn finish(self) -> Result<Staged, StoreError> {
+        self.table.finish()
+    }
 }
 
 fn row(definition: &Definition, job: Job, record: &Record) -> Vec<String> {

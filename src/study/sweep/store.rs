@@ -49,6 +49,9 @@ pub enum StoreError {
     /// The journal could not be read or written.
     #[error(transparent)]
     Journal(#[from] JournalError),
+    /// Values could not be sorted in a temporary file.
+    #[error("cannot sort values in a temporary file: {0}")]
+    Temporary(std::io::Error),
     /// A picture could not be drawn.
     #[error("drawing {file} failed: {reason}")]
     Plot {

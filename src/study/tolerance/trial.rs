@@ -131,7 +131,7 @@ impl<'a> Trial<'a> {
         };
         let (mut waiting, mut next) = (BTreeMap::new(), 0);
         let limit = usize::try_from(limit).unwrap_or(usize::MAX);
-        let ended = crew::share((self.threads, limit), self.stop, worker, does, |number, told| {
+        let ended = crew::share((self.threads, 0..limit), self.stop, worker, does, |number, told| {
             waiting.insert(number, told);
             while let Some(told) = waiting.remove(&next) {
                 next += 1;

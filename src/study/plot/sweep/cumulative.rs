@@ -23,8 +23,8 @@ pub struct Cumulative {
 pub struct Steps {
     /// Which.
     pub label: String,
-    /// Ascending.
-    pub values: Vec<f64>,
+    /// Values, ascending, each with the share of all that does not exceed it (0 to 1).
+    pub points: Vec<(f64, f64)>,
 }
 
 impl Cumulative {
@@ -48,15 +48,16 @@ impl Cumulative {
         sheet(&title, &subtitle, &footer, HEIGHT, |canvas, mut area| {
             let key = |(index, steps): (usize, &Steps)| Key::new(steps.label.clone(), series(index).0, Swatch::Line);
             legend(canvas, &mut area, &shown.iter().enumerate().map(key).collect::<Vec<_>>());
-            let (lo, hi) = ends(shown.iter().flat_map(|steps| steps.values.iter().copied()));
+            let (lo, hi) = ends(shown.iter().flat_map(|steps| steps.points.iter().map(|point| point.0)));
             let x = Axis::airy(self.sheet.axis(), lo, hi);
             let (left, right) = (x.lo, x.hi);
             let chart = Chart::draw(canvas, area, x, Axis::airy("share of repetitions [%]", 0.0, 100.0));
             for (index, steps) in shown.iter().enumerate() {
                 let mut path = vec![chart.at(left, 0.0)];
-                for (number, &value) in steps.values.iter().enumerate() {
-                    let share = |number: usize| 100.0 * number as f64 / steps.values.len() as f64;
-                    path.extend([chart.at(value, share(number)), chart.at(value, share(number + 1))]);
+                let mut before = 0.0;
+                for &(value, share) in &steps.points {
+                    path.extend([chart.at(value, before), chart.at(value, 100.0 * share)]);
+                    before = 100.0 * share;
                 }
                 path.push(chart.at(right, 100.0));
                 path.dedup();
