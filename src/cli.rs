@@ -61,8 +61,9 @@ Every value is run with the same seeds, one after the other, until a sequential 
 most --good-enough of the runs fail, and does not where --too-much and more do; each verdict is right in --confidence of
 all cases. Some 31 runs without failure prove that a value holds with the usual shares. Where nothing is drawn, one run decides.
 A value that the scenario refuses ends the search there, and its rule is told; a key that takes multiples alone, such as
-of 125 us, is searched on their grid. Bounds of shares are those of Clopper and
-Pearson, as if the number of runs had been settled beforehand.
+of 125 us, is searched on their grid. Values are written as the key takes them: with a unit, as a number, as a fraction
+where it is a gain (1/4), with an exponent where it is a share (1e-6). Bounds of shares are those of Clopper and Pearson,
+as if the number of runs had been settled beforehand.
 
 Examples:
   isodp tolerance scenarios/gc-jitter.toml --vary master.gc_jitter.half_width --from '100 ns' --to '2 us' --step '20 ns' \
@@ -72,6 +73,8 @@ Examples:
       The shortest T_DP.
   isodp tolerance scenarios/fast-cycle.toml --vary slave.#1.t_sdr --from '11 tbit' --to '255 tbit' --step '1 tbit'
       How slowly all slaves may answer together.
+  isodp tolerance scenarios/gc-jitter.toml --vary master.gc_jitter.half_width --to '2 us' --expect 'clock_failures == 0'
+      From the scenario's own value on.
 
 Files: tolerance_<key>.csv, .json and .svg.
 Exit codes of tolerance: 0 it holds at least where the search begins, 1 not even there, 2 wrong usage, scenario or file, 130
@@ -180,9 +183,10 @@ pub(crate) struct ToleranceArgs {
     /// The key of the scenario that is varied, as --set names it, for example master.gc_jitter.half_width.
     #[arg(long, value_name = "KEY")]
     pub(crate) vary: String,
-    /// Where the search begins: a value that is expected to hold, such as '100 ns', '50 ppm', '1 %' or 3.
+    /// Where the search begins: a value that is expected to hold, such as '100 ns', '50 ppm', '1 %', 1e-6, 1/4 or 3; without
+    /// it the scenario's own value of the key.
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
-    pub(crate) from: String,
+    pub(crate) from: Option<String>,
     /// Where it ends: a value that is expected to fail, larger or smaller.
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     pub(crate) to: String,

@@ -296,6 +296,54 @@ fn reader(station: u8, slave: u8, start_ms: u32) -> String {
     )
 }
 
+/// A tool that reads a parameter of all three slaves all the time, and what is warned of it.
+fn reads_all(timeout_ms: u32, per_token: u8, sets: &[(&str, &str)]) -> (Run, String) {
+    let more = format!(
+        "[[class2]]\naddress = 1\nresponse_timeout = \"{timeout_ms} ms\"\nper_token = {per_token}\n[[class2.job]]\n\
+         service = \"parameter-read\"\nparameter = 918\nslaves = \"all\"\nstart = \"600 ms\"\nperiod = \"1 us\"\n"
+    );
+    let scenario = network(1_600, &more, sets);
+    let warned = isodp::study::plan::rules::warnings(&scenario).join("\n");
+    (Run::of(&scenario), warned)
+}
+
+#[test]
+fn a_response_timeout_shorter_than_a_turn_is_warned_of() {
+    const WORDS: &str = "the class 2 master 1 may give a request up after";
+    // Three slaves, a message with a token each 8 ms: a turn takes 24 ms. With two messages it takes 8 ms or 16 ms.
+    let slow: &[(&str, &str)] = &[("master.t_dp", "8 ms"), ("bus.t_tr", "200000 tbit")];
+    for (timeout, per_token, gives_up, reads) in
+        [(20, 1, true, false), (30, 1, false, true), (10, 2, true, true), (20, 2, false, true), (10, 3, false, true)]
+    {
+        let (run, warned) = reads_all(timeout, per_token, slow);
+        let (given_up, read) = (timed_out(&run, 1).len(), values(&run, 1).len());
+        assert_eq!(warned.contains(WORDS), gives_up, "{timeout} ms, {per_token}: {warned}");
+        assert_eq!((given_up > 0, read > 0), (gives_up, reads), "{timeout} ms, {per_token}: {given_up} {read}");
+    }
+    let (_, warned) = reads_all(20, 1, slow);
+    assert_eq!(
+        warned,
+        "the class 2 master 1 may give a request up after 20 ms, before it has polled for the answer; C2_Response_Timeout > \
+         3 x T_DP = 24 ms: 3 slaves take turns, 1 of them with each token (Model: all slaves busy); response_timeout = \
+         \"30 ms\" or more, more messages per_token, or fewer slaves"
+    );
+    for name in crate::support::shipped() {
+        let warned = isodp::study::plan::rules::warnings(&scenario(&name, &[])).join("\n");
+        assert!(!warned.contains("may give a request up") && !warned.contains("over MS2"), "{name}: {warned}");
+    }
+}
+
+#[test]
+fn a_t_tr_that_leaves_no_time_for_ms2_is_warned_of() {
+    // 8 ms are 96000 t_bit.
+    for (t_tr, warns) in [("96000 tbit", true), ("120000 tbit", false)] {
+        let (run, warned) = reads_all(100, 1, &[("master.t_dp", "8 ms"), ("bus.t_tr", t_tr)]);
+        let words = "leaves the class 2 master 1 no time for any request over MS2; T_TR > T_DP = 96000 tbit: ";
+        assert_eq!(warned.contains(words), warns, "{t_tr}: {warned}");
+        assert_eq!((timed_out(&run, 1).len() > 5, values(&run, 1).is_empty()), (warns, warns), "{t_tr}");
+    }
+}
+
 #[test]
 fn ms2_two_masters_at_once_and_the_third_is_refused() {
     let more = [reader(1, 3, 300), reader(7, 3, 320), reader(8, 3, 340)].concat();

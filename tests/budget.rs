@@ -195,6 +195,11 @@ fn every_source_can_be_switched_off() {
     let strays = ["half_width = \"100 ns\"", "half_width = \"20 ns\""];
     let keys: Vec<_> = DISTURBANCES.iter().map(|of| of.0.replace(strays[0], strays[1])).collect();
     let all = disturbed("repeaters", &sets, &keys.iter().map(String::as_str).collect::<Vec<_>>());
+    let page = budget(&all).page();
+    assert!(page.lines().all(|line| line.chars().count() <= 120), "{page}");
+    for title in SOURCES.iter().map(|source| source.title).chain(["T_PLL_W", "largest |e|", "p99.9 of |e|", "left"]) {
+        assert!(page.contains(title), "{title}: {page}");
+    }
     for source in SOURCES {
         let mut without = all.clone();
         assert!((source.present)(&without), "{}", source.name);

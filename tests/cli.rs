@@ -126,6 +126,24 @@ fn help_shows_examples_that_can_be_taken_over() {
 }
 
 #[test]
+fn a_run_without_headway_leaves_nothing_that_was_not_there() {
+    let room = Room::new();
+    let call = ["run", "scene.toml", "--set", "run.duration=6 s", "--set", "run.max_events=3", "--out"];
+    for (out, there) in [("made", None), ("some/where/deep", None), ("old", Some("old")), ("full", Some("full/scene"))]
+    {
+        if let Some(there) = there {
+            fs::create_dir_all(room.path(there)).expect("a directory");
+        }
+        let before = room.contents();
+        let output = room.call(&[&call[..], &[out]].concat());
+        let said = text(&output.stderr);
+        assert_eq!((output.status.code(), text(&output.stdout)), (Some(2), ""), "{said}");
+        assert!(said.contains("the run makes no headway"), "{said}");
+        assert!(before == room.contents(), "{out}: {:?}", room.contents().keys());
+    }
+}
+
+#[test]
 fn results_are_in_the_directory_of_the_scenario_and_nowhere_else() {
     let room = Room::new();
     let page = room.runs(&["run", "scene.toml"]);

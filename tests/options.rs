@@ -326,3 +326,26 @@ fn options_that_cannot_be_are_refused() {
     let error = parse("", "", drive).unwrap_err();
     assert!(error.contains("subscriber-drive has no preset_value"), "{error}");
 }
+
+#[test]
+fn a_number_in_an_override_is_read_as_a_gain() {
+    let gain = |text: &str| {
+        let scenario = crate::support::scenario("reference", &[("slave.3.pll.kp", text)]);
+        scenario.slave(crate::support::address(3)).expect("a slave").options.pll.kp
+    };
+    for text in ["1/8", "0.125", "1.25e-1", "\"0.125\""] {
+        assert_eq!(gain(text), 8_192, "{text}");
+    }
+    assert_eq!(gain("1"), 65_536);
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/reference.toml");
+    for (key, value, words) in [
+        ("slave.3.pll.kp", "1.5", "\"1.5\" is beyond the range of a gain, 0 to 1"),
+        ("slave.3.pll.kp", "nan", "\"nan\" is not a gain"),
+        ("master.t_o", "3", "\"3\" has no unit; a time has one of the units ns, us, ms, s, min, h, tick, tbit"),
+        ("master.t_o", "true", "this is true or false"),
+    ] {
+        let sets = [(key.to_owned(), value.to_owned())];
+        let error = Scenario::load(path.as_ref(), &sets).expect_err(value).to_string();
+        assert!(error.contains(words), "{words}\n{error}");
+    }
+}

@@ -698,7 +698,8 @@ fn every_rule_finds_something() {
                  \"subscriber-drive\"\n[[link]]\npublisher = 6\nsubscriber = 9\n\
                  [[event]]\ncycle = 0\ndo = \"read-parameter\"\nparameter = 918\nslave = 6\n";
     let jitter = "data_control_time = \"1 s\"\ngc_jitter = { kind = \"normal\", sigma = \"10 ns\" }\n[[slave]]";
-    let other = "[[class1]]\naddress = 10\n";
+    let other = "[[class1]]\naddress = 10\n[[class2]]\naddress = 11\n[[class2.job]]\nservice = \"parameter-read\"\n\
+                 parameter = 918\nslave = 6\n";
     let scenario = to_plan(&[&THREE.replacen("[[slave]]", jitter, 1), drive, other].concat());
     let facts = Facts::of(&scenario);
     for rule in rules::ALL.iter().copied().flatten() {

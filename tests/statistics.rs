@@ -6,14 +6,16 @@
 use std::convert::Infallible;
 
 use isodp::sim::noise::{Purpose, Stream};
+use isodp::study::quantity::Measure;
 use isodp::study::statistics::aggregate::{Aggregate, Place, RunKey};
 use isodp::study::statistics::batch_means::BatchMeans;
-use isodp::study::statistics::bisection::{Answer, Search, Steps};
+use isodp::study::statistics::bisection::{Answer, Search};
 use isodp::study::statistics::confidence::Confidence;
 use isodp::study::statistics::probability::Probability;
-use isodp::study::statistics::quantile;
+use isodp::study::statistics::quantile::Ranks;
 use isodp::study::statistics::sequential::{SequentialSettings, SequentialTest, Verdict};
 use isodp::study::statistics::stop_rule::{Next, StopRule, StopSettings};
+use isodp::study::tolerance::scale::Scale;
 use isodp::time::Span;
 use proptest::prelude::*;
 
@@ -135,13 +137,21 @@ fn intervals_of_quantiles_hold_them_for_any_distribution() {
         let held = share(2_000, || {
             let mut values: Vec<_> = (0..count).map(|_| exponential(&mut stream)).collect();
             values.sort_unstable();
-            let found = quantile::of_sorted(&values, percent, Confidence::USUAL).unwrap();
+            let ranks = Ranks::new(count as u64, percent, Confidence::USUAL).unwrap();
+            let bound = |rank: Option<u64>| rank.map(|rank| values[rank as usize - 1] as f64);
             let at = value * US;
-            found.low.is_none_or(|low| low as f64 <= at) && found.high.is_none_or(|high| high as f64 >= at)
+            bound(ranks.low).is_none_or(|low| low <= at) && bound(ranks.high).is_none_or(|high| high >= at)
         });
         // At least as often: ranks are whole.
         assert!((0.95 - 0.015..=0.99).contains(&held), "{percent} % of {count}: {held}");
     }
+}
+
+/// Wald's mean number of runs where the failure probability is `p`, and a test ends with `held` of them at the lower bound.
+fn mean_runs(settings: &SequentialSettings, p: f64, held: f64) -> f64 {
+    let SequentialSettings { p0, p1, alpha, beta, .. } = *settings;
+    let end = held * libm::log(beta / (1.0 - alpha)) + (1.0 - held) * libm::log((1.0 - beta) / alpha);
+    end / (p * libm::log(p1 / p0) + (1.0 - p) * libm::log((1.0 - p1) / (1.0 - p0)))
 }
 
 #[test]
@@ -149,7 +159,8 @@ fn sequential_tests_err_as_rarely_and_take_as_many_runs_as_wald_says() {
     let settings =
         SequentialSettings { p0: 0.05, p1: 0.2, alpha: 0.05, beta: 0.1, limit: 100_000, at_limit: Verdict::Fails };
     let test = SequentialTest::new(settings).unwrap();
-    let (expected_good, expected_bad) = test.mean_runs();
+    let expected_good = mean_runs(&settings, settings.p0, 1.0 - settings.alpha);
+    let expected_bad = mean_runs(&settings, settings.p1, settings.beta);
     for (number, p, wrong, allowed, expected) in [
         // Wald: at most alpha / (1 - beta) and beta / (1 - alpha).
         (30, settings.p0, Verdict::Fails, 0.05 / 0.9, expected_good),
@@ -217,17 +228,20 @@ fn a_search_with_sequential_tests_finds_where_failures_set_in() {
     let settings =
         SequentialSettings { p0: 0.02, p1: 0.2, alpha: 0.01, beta: 0.01, limit: 1_000, at_limit: Verdict::Fails };
     let test = SequentialTest::new(settings).unwrap();
-    let search = Search::new(Steps(5), 0, 25, 2_000, 4).unwrap();
+    let [from, to, step] = ["0", "2000", "5"].map(|text| Measure::read(text).unwrap());
+    let scale = Scale::stepped(from, to, step).unwrap();
+    let at = |number: i64| 5 * number;
+    let search = Search::new(&scale, 0, 5, scale.last(), 4).unwrap();
     for number in 50..60 {
         let mut stream = draws(number);
         let found =
-            search.run(|value| test.run(|_| Ok::<_, Infallible>(happens(&mut stream, failing(value))))).unwrap();
+            search.run(|value| test.run(|_| Ok::<_, Infallible>(happens(&mut stream, failing(at(value)))))).unwrap();
         let Answer::Band { holds, fails } = found.answer else { panic!("a band") };
-        assert_eq!(fails - holds, 5);
+        assert_eq!(fails - holds, 1);
         // p0 is at 461, p1 at 486; in between either answer will do.
-        assert!((450..=495).contains(&holds), "{holds}");
+        assert!((450..=495).contains(&at(holds)), "{holds}");
         assert!(found.inversions.is_empty() && found.runs() < 3_000, "{} runs", found.runs());
-        let told = found.curve.iter().map(|point| (point.value, point.tested));
+        let told = found.curve.iter().map(|point| (at(point.value), point.tested));
         for (value, tested) in told {
             let (low, high) = Probability::of(tested.failures, tested.runs, Confidence::new(0.9999).unwrap()).bounds();
             assert!(low <= failing(value) && failing(value) <= high, "{value}: {tested:?}");

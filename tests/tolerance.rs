@@ -61,7 +61,7 @@ fn call(room: &Room, vary: &str, from: &str, to: &str) -> Call {
         file: room.path("still.toml"),
         out: room.path("out"),
         vary: vary.to_owned(),
-        from: from.to_owned(),
+        from: Some(from.to_owned()),
         to: to.to_owned(),
         probes: 2,
         threads: 1,
@@ -345,6 +345,103 @@ fn a_search_that_is_stopped_leaves_nothing() {
         (End::Stopped, "stopped after 0 values, 0 runs; nothing is written, and the same call begins again\n")
     );
     assert!(!room.path("out").exists());
+}
+
+#[test]
+fn gains_are_searched_as_fractions() {
+    // The integral part must be well below the proportional one, or the loop swings up and loses the clock (Model: D11).
+    let room = room(STRAY);
+    let call = Call {
+        step: Some("1/64".to_owned()),
+        sets: vec![set("disturbance.1.offset", "500 ns"), set("slave.3.pll.ki", "1/1024")],
+        expects: vec!["slave.3.clock_failures == 0".to_owned()],
+        ..call(&room, "slave.3.pll.kp", "1/2", "1/64")
+    };
+    let (page, json) = found(&call, End::Found);
+    assert!(page.contains("how far can slave.3.pll.kp go from 1/2 towards 1/64?"), "{page}");
+    assert!(page.contains("values     in steps of 1/64\n"), "{page}");
+    let texts: Vec<_> = json["curve"].as_array().unwrap().iter().map(|point| point["text"].as_str().unwrap()).collect();
+    assert!(texts.contains(&"1/2") && texts.contains(&"1/64"), "{texts:?}");
+    assert!(texts.iter().all(|text| text.contains('/')), "{texts:?}");
+    assert!(json["curve"].as_array().unwrap().iter().all(|point| point["verdict"] != "refused"), "{page}");
+}
+
+#[test]
+fn shares_are_searched_with_an_exponent() {
+    let room = room(&LOSS.replace("0 %", "2e-3"));
+    let call = Call {
+        sets: vec![set("run.cycles", "205")],
+        expects: vec!["slave.3.faults.0F02=== 0".to_owned()],
+        resolution: Some("20 %".to_owned()),
+        good_enough: Some("5 %".to_owned()),
+        too_much: Some("20 %".to_owned()),
+        threads: 2,
+        from: None,
+        ..call(&room, "disturbance.1.rate", "", "5e-1")
+    };
+    let (page, json) = found(&call, End::Found);
+    assert!(page.contains("how far can disturbance.1.rate go from 2e-3 towards 0.5?"), "{page}");
+    assert!(page.contains("\nbegins     at 2e-3, the scenario's own value\n"), "{page}");
+    assert_eq!((&json["from"], &json["from_scenario"], &json["to"]), (&0.002.into(), &true.into(), &0.5.into()));
+    // Both requests of a cycle must be lost, as in the closed form.
+    let of = |rate: &Value| trips(number(rate).powi(2), 100, 1);
+    assert!(of(&json["holds"]) < 0.2 && of(&json["fails"]) > 0.05, "{page}");
+}
+
+#[test]
+fn between_whole_numbers_are_fractions_where_the_key_takes_some() {
+    let room = room(LOSS);
+    for (key, from, to, step) in [
+        ("slave.3.pll.kp", "1", "0", "0.001"),
+        ("disturbance.1.rate", "0", "1", "0.001"),
+        ("slave.#1.max_life_failures", "1", "9", "1"),
+    ] {
+        let call = Call {
+            expects: vec!["cycles >= 1".to_owned()],
+            sets: vec![set("run.cycles", "30")],
+            probes: 0,
+            ..call(&room, key, from, to)
+        };
+        let (page, json) = found(&call, End::Found);
+        assert_eq!((&json["step"], &json["answer"]), (&step.into(), &"everywhere".into()), "{page}");
+    }
+}
+
+#[test]
+fn a_search_begins_with_the_scenarios_own_value_where_it_has_one() {
+    let room = room("");
+    let own = |vary: &str, to: &str| Call {
+        from: None,
+        expects: vec!["cycles >= 1".to_owned()],
+        ..call(&room, vary, "", to)
+    };
+    let (page, json) =
+        found(&Call { sets: vec![set("slave.#1.t_sdr", "20 tbit")], ..own("slave.4.t_sdr", "100 tbit") }, End::Found);
+    assert!(
+        page.contains("go from 20 tbit towards") && page.contains("begins     at 20 tbit, the scenario's own value"),
+        "{page}"
+    );
+    assert_eq!((&json["from"], &json["from_scenario"]), (&20.0.into(), &true.into()));
+    let written = Call { from: Some("625 us".to_owned()), ..own("master.t_o", "700 us") };
+    let (page, json) = found(&written, End::Found);
+    assert!(!page.contains("own value") && json["from_scenario"] == false, "{page}");
+    let refused = |call: &Call| tolerance(call, &AtomicBool::new(false), |_| ()).unwrap_err().to_string();
+    let source = room.path("still.toml").display().to_string();
+    assert_eq!(
+        refused(&own("slave.3.t_sdr", "100 tbit")),
+        format!(
+            "--vary \"slave.3.t_sdr\": {source} does not set this key, so that the search has no beginning\n  help: write --from VALUE, a value that is expected to hold"
+        )
+    );
+    assert_eq!(
+        refused(&own("slave.#1.device", "100 tbit")),
+        format!(
+            "--vary \"slave.#1.device\": {source} has posital-ocd-dpb1b here: \"posital-ocd-dpb1b\" is no number with a unit\n  help: write --from VALUE, a value that is expected to hold"
+        )
+    );
+    assert!(
+        refused(&own("master.t_o", "625 us")).contains("--to \"625 us\": this range begins and ends with \"625 us\"")
+    );
 }
 
 #[test]

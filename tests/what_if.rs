@@ -268,7 +268,7 @@ fn a_run_without_headway_is_told_as_by_run() {
     assert_eq!(told(&["replay", "scene.toml", "--cycle", "2900", "--set", "slave.4.crystal=9 ppm"]), run);
     // Before the cycle all may be well, and after it not.
     told(&["replay", "scene.toml", "--cycle", "40", "--set", "slave.4.crystal=9 ppm"]);
-    assert_eq!(std::fs::read_dir(room.path("out/scene")).expect("a directory").count(), 0, "nothing half-written");
+    assert!(!room.path("out").exists(), "nothing half-written");
 }
 
 #[test]

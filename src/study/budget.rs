@@ -45,6 +45,8 @@ use source::{SOURCES, Source};
 
 /// Encoders on the page; of more, those with the least left.
 pub const SHOWN: usize = 16;
+/// Most characters of a line of the page.
+const COLUMNS: usize = 120;
 /// The picture.
 const PICTURE: &str = "budget.svg";
 /// The numbers.
@@ -307,19 +309,51 @@ impl Budget {
     }
 
     fn table(&self, slaves: &[&SlaveBudget], title: &str, figure: Figure) -> Vec<String> {
-        let mut header = vec!["slave", "T_PLL_W"];
+        // What matters most comes first: the rest may go on below.
+        let mut header = vec!["slave", "T_PLL_W", title, "left"];
         header.extend(self.sources.iter().map(|source| source.title));
-        header.extend(["rest", "interaction", title, "left"]);
+        header.extend(["rest", "interaction"]);
         let row = |slave: &&SlaveBudget| {
             let all = slave.shares.as_ref()?;
             let of = figure.shares(all);
-            let mut row = vec![slave.address.to_string(), tenths(slave.window)];
+            let mut row = vec![slave.address.to_string()];
+            row.extend([slave.window, of.whole, slave.window - of.whole].map(tenths));
             row.extend((0..of.parts.len()).map(|source| figure.part(all, source)));
-            row.extend([of.rest, of.interaction, of.whole, slave.window - of.whole].map(tenths));
+            row.extend([of.rest, of.interaction].map(tenths));
             Some(row)
         };
-        aligned(&header, &[], &slaves.iter().filter_map(row).collect::<Vec<_>>())
+        folded(&header, &slaves.iter().filter_map(row).collect::<Vec<_>>())
     }
+}
+
+/// A table of numbers whose first column says whose they are. What does not fit into [`COLUMNS`] goes on below, indented,
+/// with the first column once more.
+fn folded(header: &[&str], rows: &[Vec<String>]) -> Vec<String> {
+    /// Between two columns, and in front of what goes on.
+    const GAP: usize = 2;
+    let width = |column: usize| {
+        let cells = rows.iter().map(|row| row[column].chars().count());
+        GAP + cells.chain([header[column].chars().count()]).max().unwrap_or(0)
+    };
+    let mut parts: Vec<Vec<usize>> = vec![vec![0]];
+    let mut taken = width(0);
+    for column in 1..header.len() {
+        if taken + width(column) > COLUMNS {
+            parts.push(vec![0]);
+            taken = GAP + width(0);
+        }
+        taken += width(column);
+        parts.last_mut().expect("one at least").push(column);
+    }
+    let part = |(number, columns): (usize, &Vec<usize>)| {
+        let header: Vec<_> = columns.iter().map(|&column| header[column]).collect();
+        let rows: Vec<Vec<_>> =
+            rows.iter().map(|row| columns.iter().map(|&column| row[column].clone()).collect()).collect();
+        let indent = if number > 0 { GAP } else { 0 };
+        let lines = aligned(&header, &[], &rows).into_iter();
+        lines.map(|line| format!("{:indent$}{line}", "")).collect::<Vec<_>>()
+    };
+    parts.iter().enumerate().flat_map(part).collect()
 }
 
 /// A figure of the page.
@@ -353,4 +387,29 @@ fn ns(span: Span) -> Value {
 fn tenths(span: Span) -> String {
     let text = format!("{:.1}", span.as_ns());
     if text == "-0.0" { "0.0".to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_folded_where_they_do_not_fit() {
+        let row = |slave: &str, cells: usize| {
+            let cells = (1..cells).map(|column| format!("{slave}{column:0>18}"));
+            std::iter::once(slave.to_owned()).chain(cells).collect::<Vec<_>>()
+        };
+        let titles = ["slave", "a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l"];
+        // A line of n cells has 5 + 21 (n - 1) characters, one that goes on two more.
+        for (cells, lengths) in [(1, &[5][..]), (6, &[110]), (7, &[110, 28]), (11, &[110, 112]), (12, &[110, 112, 28])]
+        {
+            let lines = folded(&titles[..cells], &[row("3", cells), row("4", cells)]);
+            let found: Vec<_> = lines.chunks(3).map(|part| part[0].len()).collect();
+            assert_eq!(found, lengths, "{lines:#?}");
+            assert!(lines.chunks(3).skip(1).all(|part| part[0].starts_with("  slave")), "{lines:#?}");
+            let all: Vec<&str> = lines.iter().flat_map(|line| line.split_whitespace()).collect();
+            assert!(titles[..cells].iter().all(|title| all.contains(title)), "{lines:#?}");
+            assert!(row("4", cells).iter().all(|cell| all.contains(&cell.as_str())), "{lines:#?}");
+        }
+    }
 }

@@ -226,7 +226,7 @@ pub fn angle(text: &str) -> Result<Angle, QuantityError> {
         .ok_or_else(|| range(text, &ANGLE, "-2147483648 rev", "2147483647 rev"))
 }
 
-/// Reads a gain (1/65536), `"1/4"` or `"0.25"`, rounded to the nearest step, halves up.
+/// Reads a gain (1/65536), `"1/4"`, `"0.25"` or `"25e-2"`, rounded to the nearest step, halves up.
 ///
 /// # Errors
 /// No gain, or one that is negative or above 1.
@@ -235,8 +235,8 @@ pub fn gain(text: &str) -> Result<u32, QuantityError> {
     const ONE: i128 = 1 << 16;
     let (above, below) = text.split_once('/').unwrap_or((text, "1"));
     let none = || QuantityError::NoNumber { text: text.into(), noun: GAIN.noun, example: GAIN.example };
-    let above = Decimal::parse(above.trim()).ok_or_else(none)?;
-    let below = Decimal::parse(below.trim()).filter(|below| below.digits > 0).ok_or_else(none)?;
+    let above = Decimal::plain(above).ok_or_else(none)?;
+    let below = Decimal::plain(below).filter(|below| below.digits > 0).ok_or_else(none)?;
     let rounded = above.times((ONE, below.digits)).and_then(|(above, denominator)| {
         let numerator = above.checked_mul(10i128.pow(below.places))?.checked_mul(2)?;
         Some(numerator.checked_add(denominator)?.div_euclid(denominator.checked_mul(2)?))
@@ -266,15 +266,13 @@ pub fn bit_rate(text: &str) -> Result<BitRate, QuantityError> {
 /// # Errors
 /// No share, one that is finer than 10^-15, or one that is not between 0 and 1.
 pub fn share(text: &str) -> Result<Share, QuantityError> {
-    let (number, unit) = Decimal::split(text, &SHARE)?;
-    let exponent = unit.strip_prefix(['e', 'E']).and_then(|exponent| exponent.parse::<i32>().ok());
-    let ratio = match exponent {
-        _ if unit.is_empty() => (Share::WHOLE.into(), 1),
-        Some(exponent @ -30..=2) if exponent >= -15 => (10i128.pow((15 + exponent) as u32), 1),
-        Some(exponent @ -30..=2) => (1, 10i128.pow((-15 - exponent) as u32)),
-        _ => ratio(text, unit, &SHARE, &[])?,
+    let parts = if let Some(number) = Decimal::plain(text) {
+        number.times((Share::WHOLE.into(), 1))
+    } else {
+        let (number, unit) = Decimal::split(text, &SHARE)?;
+        number.times(ratio(text, unit, &SHARE, &[])?)
     };
-    let parts = whole(text, &SHARE, number.times(ratio))?;
+    let parts = whole(text, &SHARE, parts)?;
     u64::try_from(parts).ok().and_then(Share::new).ok_or_else(|| range(text, &SHARE, "0", "1"))
 }
 
@@ -297,6 +295,22 @@ impl Decimal {
         let (number, unit) = trimmed.split_at(end);
         let none = || QuantityError::NoNumber { text: text.into(), noun: kind.noun, example: kind.example };
         Ok((Self::parse(number).ok_or_else(none)?, unit.trim()))
+    }
+    /// Reads a number without a unit, with or without an exponent.
+    fn plain(text: &str) -> Option<Self> {
+        let (number, rest) = Self::split(text, &GAIN).ok()?;
+        if rest.is_empty() { Some(number) } else { number.shifted(rest.strip_prefix(['e', 'E'])?.parse().ok()?) }
+    }
+    /// The product with 10^`exponent`; none far beyond what any quantity has.
+    fn shifted(self, exponent: i32) -> Option<Self> {
+        /// Most places that leave room for the unit.
+        const MAX_PLACES: u32 = 36;
+        match exponent {
+            0..=15 => Some(Self { digits: self.digits.checked_mul(10i128.pow(exponent as u32))?, ..self }),
+            -30..0 => Some(Self { places: self.places + exponent.unsigned_abs(), ..self })
+                .filter(|number| number.places <= MAX_PLACES),
+            _ => None,
+        }
     }
     /// Reads `[+-]digits[.digits]` with underscores between digits.
     fn parse(number: &str) -> Option<Self> {
@@ -326,6 +340,17 @@ impl Decimal {
     }
 }
 
+/// How a [`Measure`] without a unit is written, and those that are reckoned from it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Form {
+    /// `0.25`, and everything with a unit.
+    Decimal,
+    /// `1/4`.
+    Fraction,
+    /// `2.5e-1`.
+    Exponent,
+}
+
 /// A number with the unit of any quantity, or with none, exact: for what compares and counts values without knowing which
 /// key they are for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -338,29 +363,47 @@ pub struct Measure {
     steps: (i128, i128),
     /// Steps in one of the unit.
     ratio: (i128, i128),
+    form: Form,
 }
 
 impl Measure {
     /// The kinds whose units tell them apart.
     /// A `ppm` is one of a frequency here.
     const KINDS: [&'static Kind; 8] = [&TIME, &BITS, &LENGTH, &DEVIATION, &SPEED, &ANGLE, &SHARE, &RATE];
-    /// Most digits of a number: products of a few of them do not overflow.
+    /// Most digits of a number, and most of its places.
     const DIGITS: usize = 15;
 
-    /// Reads `"1.5 ms"`, `"1500 rpm"`, `"7"`; none if it is anything else, or a number of more than 15 digits.
+    /// Reads `"1.5 ms"`, `"1500 rpm"`, `"7"`, `"1/4"`, `"1e-6"`; none if it is anything else, or a number of more than 15
+    /// digits.
     pub fn read(text: &str) -> Option<Self> {
-        let (number, unit) = Decimal::split(text, &TIME).ok()?;
-        if number.digits.unsigned_abs().to_string().len() > Self::DIGITS || number.places as usize > Self::DIGITS {
-            return None;
-        }
+        Self::without_unit(text).or_else(|| Self::with_unit(text))
+    }
+    fn with_unit(text: &str) -> Option<Self> {
+        let (number, unit) = Decimal::split(text, &TIME).ok().filter(|(number, _)| Self::is_short(number))?;
         let unit = SPELLINGS.iter().find(|(other, _)| *other == unit).map_or(unit, |&(_, usual)| usual);
         let of_kind = |kind: &'static Kind| {
             let &(unit, ratio) = kind.units.iter().find(|(name, _)| *name == unit)?;
             Some((unit, kind.noun, ratio))
         };
-        let none = unit.is_empty().then_some(("", "", (1, 1)));
-        let (unit, noun, ratio) = none.or_else(|| Self::KINDS.into_iter().find_map(of_kind))?;
-        Some(Self { unit, noun, steps: lowest(number.times(ratio)?), ratio })
+        let (unit, noun, ratio) = Self::KINDS.into_iter().find_map(of_kind)?;
+        Some(Self { unit, noun, steps: lowest(number.times(ratio)?), ratio, form: Form::Decimal })
+    }
+    fn without_unit(text: &str) -> Option<Self> {
+        let part = |text| Decimal::plain(text).filter(Self::is_short);
+        let (above, below) = text.split_once('/').unwrap_or((text, "1"));
+        let (above, below) = (part(above)?, part(below).filter(|below| below.digits > 0)?);
+        let ten = |places| 10i128.pow(places);
+        let steps = above.times((ten(below.places), below.digits))?;
+        let form = match text {
+            _ if text.contains('/') => Form::Fraction,
+            _ if text.contains(['e', 'E']) => Form::Exponent,
+            _ => Form::Decimal,
+        };
+        Some(Self { unit: "", noun: "", steps: lowest(steps), ratio: (1, 1), form })
+    }
+    /// Whether products of it and a few others do not overflow.
+    fn is_short(number: &Decimal) -> bool {
+        number.digits.unsigned_abs().to_string().len() <= Self::DIGITS && number.places as usize <= Self::DIGITS
     }
     /// The number of this kind's smallest steps, a fraction in lowest terms.
     pub const fn steps(self) -> (i128, i128) {
@@ -394,6 +437,17 @@ impl Measure {
         let (whole, fraction) = digits.split_at(digits.len() - places);
         Some(if places == 0 { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") })
     }
+    /// A fraction as one, and a number with an exponent as such; none if it is none.
+    fn as_written(self) -> Option<String> {
+        match self.form {
+            Form::Decimal => None,
+            Form::Fraction => Some(format!("{}/{}", self.steps.0, self.steps.1)),
+            Form::Exponent => {
+                let text = format!("{:e}", self.value());
+                Self::read(&text).is_some_and(|read| read.steps == self.steps).then_some(text)
+            }
+        }
+    }
     /// Whether `other` measures the same.
     pub fn is_like(self, other: Self) -> bool {
         self.noun == other.noun
@@ -406,10 +460,16 @@ impl Measure {
         self.is_like(other).then(|| exact.map_or_else(nearly, |(mine, theirs)| mine.cmp(&theirs)))
     }
 }
-/// The unit's own number where it has an end, otherwise steps of time: `1.5 ms`, `18001 tick`.
+/// The unit's own number where it has an end, otherwise steps of time: `1.5 ms`, `18001 tick`. A fraction or a number with
+/// an exponent stays one where that is shorter: `15/64`, but `0.2401`.
 impl fmt::Display for Measure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.decimal_in(*self) {
+        let decimal = self.decimal_in(*self);
+        let length = decimal.as_ref().map_or(usize::MAX, String::len);
+        if let Some(written) = self.as_written().filter(|written| written.len() <= length) {
+            return f.write_str(&written);
+        }
+        match decimal {
             Some(number) if self.unit.is_empty() => f.write_str(&number),
             Some(number) => write!(f, "{number} {}", self.unit),
             None if self.noun == TIME.noun && self.steps.1 == 1 => write!(f, "{} tick", self.steps.0),
@@ -483,9 +543,15 @@ mod tests {
 
     #[test]
     fn gains_are_fractions_or_decimals() {
-        for (text, steps) in
-            [("1/4", 16_384), ("0.25", 16_384), ("1 / 32", 2_048), ("0", 0), ("1", 65_536), ("0.3", 19_661)]
-        {
+        for (text, steps) in [
+            ("1/4", 16_384),
+            ("0.25", 16_384),
+            ("25e-2", 16_384),
+            ("1 / 32", 2_048),
+            ("0", 0),
+            ("1", 65_536),
+            ("0.3", 19_661),
+        ] {
             assert_eq!(gain(text), Ok(steps), "{text}");
         }
         assert_eq!(gain("1/3"), Ok(21_845));
@@ -516,6 +582,39 @@ mod tests {
         assert_eq!(read("1 tick").decimal_in(read("1 us")), None);
         assert_eq!(read("1 us").with_steps((12_001, 1)).unwrap().to_string(), "12001 tick");
         for text in ["3..10", "12 parsec", "", "ms", "0.1234567890123456 s", "uniform"] {
+            assert_eq!(Measure::read(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn measures_without_unit_may_be_fractions_and_have_exponents() {
+        let read = |text| Measure::read(text).unwrap_or_else(|| panic!("{text}"));
+        for (text, steps) in
+            [("1/4", (1, 4)), ("2 / 6", (1, 3)), ("1e-6", (1, 1_000_000)), ("2.5E3", (2_500, 1)), ("-1/2", (-1, 2))]
+        {
+            assert_eq!((read(text).steps(), read(text).unit), (steps, ""), "{text}");
+        }
+        for (text, shown) in [
+            ("1/4", "1/4"),
+            ("2/6", "1/3"),
+            ("2401/10000", "0.2401"),
+            ("8/2", "4"),
+            ("1e-6", "1e-6"),
+            ("56.2e-6", "5.62e-5"),
+            ("1e-2", "1e-2"),
+            ("250e-3", "0.25"),
+            ("1e3", "1e3"),
+            ("0.000001", "0.000001"),
+        ] {
+            assert_eq!(read(text).to_string(), shown);
+            assert_eq!(read(shown).steps(), read(text).steps());
+        }
+        assert_eq!(read("1/64").with_steps((15, 64)).unwrap().to_string(), "15/64");
+        assert_eq!(read("1e-6").with_steps((3, 10_000_000)).unwrap().to_string(), "3e-7");
+        assert_eq!(read("1/4").compare(read("0.26")), Some(Ordering::Less));
+        for text in
+            ["1/0", "1/2/3", "1/-2", "/2", "1e", "1e99", "1e-31", "e-6", "1 s/2", "1/4 ms", "1e-6 s", "2026-01-01"]
+        {
             assert_eq!(Measure::read(text), None, "{text}");
         }
     }
@@ -663,7 +762,8 @@ mod tests {
         #[test]
         fn no_text_panics(text in "[-+.0-9_ a-zµ/]{0,40}") {
             let _ = (span(&text, Some(BitRate::M12)), tbit(&text), millimetres(&text), ppb(&text));
-            let _ = (micro_rpm(&text), angle(&text), bit_rate(&text), share(&text));
+            let _ = (micro_rpm(&text), angle(&text), bit_rate(&text), share(&text), gain(&text));
+            let _ = Measure::read(&text).map(|measure| measure.to_string());
         }
     }
 }

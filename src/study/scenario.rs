@@ -26,6 +26,7 @@ mod services;
 mod station;
 pub mod topology;
 pub(super) mod tree;
+mod written;
 
 use check::Check;
 pub use class2::{Class2, Class2Job};
@@ -61,6 +62,7 @@ use std::io::Read;
 use std::path::Path;
 pub use topology::{Point, Topology};
 use tree::Source;
+pub(super) use written::written;
 
 /// A whole scenario, complete and checked.
 #[derive(Clone, PartialEq, Debug)]

@@ -1,6 +1,6 @@
 //! The expected answers of the shipped scenarios with disturbances of stations, crystals and paths.
 
-use isodp::observation::{HandlerState, Observation, Phase, SlaveCause, SlaveState};
+use isodp::observation::{AcyclicResult, ClockVerdict, HandlerState, Observation, Phase, SlaveCause, SlaveState};
 use isodp::time::{Span, Time};
 
 use crate::support::{Run, address, scenario};
@@ -11,6 +11,7 @@ pub(crate) const TESTS: &[(&str, fn())] = &[
     ("crystal-drift", crystal_drift),
     ("life-sign-jump", life_sign_jump),
     ("master-stop", master_stop),
+    ("overlong-acyclic", overlong_acyclic),
     ("slave-restart", slave_restart),
 ];
 
@@ -129,4 +130,44 @@ fn crystal_drift() {
     assert!(t_dp(400).abs() < Span::from_ns(1), "{}", t_dp(400));
     let last = t_dp(run.cycles.len() - 2);
     assert!((Span::from_ns(36)..Span::from_ns(41)).contains(&last), "{last}");
+}
+
+#[test]
+fn overlong_acyclic() {
+    let run = Run::of(&scenario("overlong-acyclic", &[]));
+    let late = |row: &isodp::study::row::EventRow| match row.what {
+        Observation::ClockLate { by } => Some((row.cycle, by)),
+        _ => None,
+    };
+    let late: Vec<_> = run.events_of(2).filter_map(late).collect();
+    let cycles: Vec<_> = late.iter().map(|&(cycle, _)| cycle).collect();
+    assert_eq!(cycles, [500, 550, 600].into_iter().chain(900..912).collect::<Vec<_>>());
+    for &(cycle, by) in &late[..4] {
+        assert!((Span::from_us(45)..Span::from_us(46)).contains(&by), "{cycle}: {by}");
+    }
+    for pair in late[3..].windows(2) {
+        // What was left out is T_DP, 1.5 ms.
+        let missed = if pair[1].0 == 910 { Span::from_us(1_500) } else { Span::ZERO };
+        let more = (pair[1].1 + missed - pair[0].1).as_us();
+        assert!((more - 151.7).abs() < 0.2 || (more - 166.3).abs() < 0.2, "{pair:?}");
+    }
+    let left_out = |what: &Observation| matches!(what, Observation::SynchMissed { cycles: 1 });
+    let missed: Vec<_> = run.events_of(2).filter(|row| left_out(&row.what)).map(|row| row.cycle).collect();
+    assert_eq!(missed, [910]);
+    for slave in 3..=5 {
+        let missing = |what: &Observation| matches!(what, Observation::Clock { verdict: ClockVerdict::Missing, .. });
+        let missing: Vec<_> = run.events_of(slave).filter(|row| missing(&row.what)).map(|row| row.cycle).collect();
+        assert_eq!(missing[..5], [500, 550, 600, 900, 901], "slave {slave}");
+        assert!(missing.iter().all(|&cycle| cycle < 913), "slave {slave}");
+        assert_eq!(run.faults_of(slave), [(902, 0x0F04)]);
+        let end = run.cycles[912].t0;
+        let back = after(&operations(&run, slave)[1..], end);
+        assert!(back.len() == 1 && (78.0..80.0).contains(&back[0]), "{back:?}");
+        assert!(instants(&run, slave, watchdog).is_empty());
+        // Ten good clocks have repaid each of the late ones.
+        assert_eq!((run.row(slave, 499).clock_counter, run.row(slave, 520).clock_counter), (0, 0), "slave {slave}");
+    }
+    let acyclic = run.counts.as_ref().expect("the run is over").acyclic.of(isodp::observation::MasterClass::One);
+    assert_eq!(acyclic.ended(AcyclicResult::Positive), 0);
+    assert!(acyclic.ended(AcyclicResult::Negative) > 15);
 }

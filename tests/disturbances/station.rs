@@ -5,10 +5,11 @@ use isodp::observation::{
     ClockVerdict, Disturbance, HandlerState, LifeState, MasterMode, Observation, Phase, SlaveCause,
 };
 use isodp::sim::fingerprint::{Fingerprint, Fingerprints};
-use isodp::sim::network::{Network, NetworkEvent, Until};
+use isodp::sim::network::{Network, NetworkEvent};
 use isodp::sim::queue::NearQueue;
 use isodp::sim::record::{Origin, Recorder, Stamp, Transmission};
 use isodp::study::build;
+use isodp::study::difference::Differences;
 use isodp::study::scenario::Scenario;
 use isodp::study::what_if;
 use isodp::time::{Span, Time};
@@ -163,11 +164,14 @@ fn a_further_master_can_lose_its_supply_too() {
     }
 }
 
-/// Every telegram that reached the line, or may still.
+/// A telegram: first bit, sender, octets.
+type Sent = (Time, Address, Vec<u8>);
+
+/// Every telegram that reached the line, or may still, and those that were withdrawn.
 #[derive(Default)]
 struct Line {
-    sent: Vec<(Time, Address, Vec<u8>)>,
-    withdrawn: usize,
+    sent: Vec<Sent>,
+    withdrawn: Vec<Sent>,
 }
 impl Recorder for Line {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
@@ -175,10 +179,19 @@ impl Recorder for Line {
     }
     fn observe(&mut self, _: Stamp<'_>, _: &Observation) {}
     fn withdrawn(&mut self, sender: Address, now: Time) {
-        let before = self.sent.len();
-        self.sent.retain(|&(start, by, _)| by != sender || start <= now);
-        self.withdrawn += before - self.sent.len();
+        let stays = |(start, by, _): &Sent| *by != sender || *start <= now;
+        let (sent, withdrawn) = std::mem::take(&mut self.sent).into_iter().partition(stays);
+        self.sent = sent;
+        self.withdrawn.extend::<Vec<_>>(withdrawn);
     }
+}
+
+/// Runs a scenario to its end.
+fn lined(scenario: &Scenario) -> (Fingerprints, Line) {
+    let mut network: Network<Node, NearQueue<NetworkEvent>> = build::network(scenario);
+    let mut recorder = (Fingerprints::new(address(2)), Line::default());
+    assert!(network.run(isodp::study::run::until(scenario), 10_000_000, &mut recorder));
+    recorder
 }
 
 /// At whatever instant of a cycle the supply fails: the fingerprint of the wire is that of what was on it.
@@ -191,10 +204,7 @@ fn what_a_station_could_not_send_any_more_is_in_no_fingerprint() {
             ["2", "3"].map(|station| format!("kind = \"restart\"; name = \"{station}\"; station = {station}; {off}"));
         let sets = [("run.cycles", "70")];
         let scenario = changed(&sets, &tables(&keys.each_ref().map(String::as_str)));
-        let mut network: Network<Node, NearQueue<NetworkEvent>> = build::network(&scenario);
-        let mut recorder = (Fingerprints::new(address(2)), Line::default());
-        assert!(network.run(Until::Cycle(70), 10_000_000, &mut recorder));
-        let (prints, line) = recorder;
+        let (prints, line) = lined(&scenario);
         let mut expected = Fingerprints::new(address(2));
         for (start, sender, octets) in &line.sent {
             let origin = Origin::Sender;
@@ -203,9 +213,37 @@ fn what_a_station_could_not_send_any_more_is_in_no_fingerprint() {
         }
         let wires = |prints: &Fingerprints| prints.stations().map(|(by, print)| (by, print.wire)).collect::<Vec<_>>();
         assert_eq!(wires(&prints), wires(&expected), "{off}");
-        withdrawn += line.withdrawn;
+        withdrawn += line.withdrawn.len();
     }
     assert!(withdrawn > 20, "{withdrawn}");
+}
+
+/// Two runs that differ in nothing but how far one SYNCH strays: where the supply fails before it begins, they are the same.
+#[test]
+fn what_a_station_could_not_send_any_more_is_no_difference() {
+    let strays = |name: &str, more: &str, ticks: i64| {
+        let jitter = "kind = \"gc-jitter\"; shape = \"uniform\"; half_width = \"300 ns\"; cycle = 50; for = 1";
+        let end = format!("{ticks} tick");
+        changed(&[("run.duration", &end)], &tables(&[&format!("{jitter}; name = \"{name}\""), more]))
+    };
+    let still = "kind = \"silent\"; station = 3; at = \"1 h\"";
+    let t0 = Run::of(&strays("one", still, 12_000 * 150_000)).cycles[50].t0.ticks();
+    let mut unsent = 0;
+    for step in 0..60 {
+        // SYNCH itself takes 12 us.
+        let off = t0 - 12_000 * 5 - 6_000 * step;
+        let restart = format!("kind = \"restart\"; station = 2; at = \"{off} tick\"; for = \"50 ms\"");
+        let [one, other] = ["one", "other"].map(|name| strays(name, &restart, t0 + 12_000 * 1_000));
+        let [(one_prints, one_line), (other_prints, other_line)] = [&one, &other].map(lined);
+        let found = Differences::of::<NearQueue<NetworkEvent>>(&one, &other);
+        if one_prints.total() == other_prints.total() {
+            assert_eq!(found, Differences::default(), "{restart}");
+            unsent += usize::from(one_line.withdrawn != other_line.withdrawn);
+        } else {
+            assert!(found.first().is_some(), "{restart}");
+        }
+    }
+    assert!(unsent > 2, "{unsent}");
 }
 
 #[test]

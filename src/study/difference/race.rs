@@ -1,8 +1,8 @@
 //! Race: two networks in lockstep, compared station by station.
 //!
 //! Both run to the same instant, then what they did is laid side by side: the first happening of a station in one run
-//! belongs to its first in the other. A happening without counterpart waits until the other run has passed its instant;
-//! then it is something that only one of them did.
+//! belongs to its first in the other. Each waits until both runs have passed its instant: until then a telegram may be
+//! withdrawn. What has no counterpart then is something that only one of them did.
 
 use super::tape::{Strand, Tape};
 use super::{Difference, Differences};
@@ -104,6 +104,8 @@ pub struct Race<Q, R = ()> {
     sides: [Side<Q, R>; 2],
     /// How far both go between two looks.
     stride: Span,
+    /// Until when both tapes are complete.
+    passed: Time,
     /// For each station, what was found first in each strand.
     found: Vec<[Option<Difference>; 2]>,
 }
@@ -127,14 +129,15 @@ impl<Q: Queue<NetworkEvent>, R: Recorder> Race<Q, R> {
     /// Networks that are under way at the same instant, compared every `stride`.
     pub(in crate::study) fn of(runners: [Runner<Q, R>; 2], stride: Span) -> Self {
         let sides = runners.map(Side::new);
-        Self { sides, stride: stride.max(Span::from_us(100)), found: vec![[None, None]; Tape::STATIONS] }
+        let found = vec![[None, None]; Tape::STATIONS];
+        Self { sides, stride: stride.max(Span::from_us(100)), passed: Time::ZERO, found }
     }
 
     /// Both to `to`, as far as they go.
     pub(in crate::study) fn advance(&mut self, to: Time) {
         let [before, now] = &mut self.sides;
-        let passed = before.advance(to).min(now.advance(to));
-        self.compare(passed);
+        self.passed = before.advance(to).min(now.advance(to));
+        self.compare(self.passed);
     }
     /// From here on `cycle` is under way in both. Gives the second network, to be changed.
     pub(in crate::study) fn begin(&mut self, cycle: u64) -> &mut Network<Node, Q> {
@@ -166,13 +169,16 @@ impl<Q: Queue<NetworkEvent>, R: Recorder> Race<Q, R> {
             self.advance(to);
         }
     }
-    fn finish(self) -> (Differences, [(Time, R); 2]) {
+    fn finish(mut self) -> (Differences, [(Time, R); 2]) {
+        // Nothing is withdrawn any more.
+        self.compare(Time::MAX);
         let differences = Differences::new(&self.found);
         (differences, self.sides.map(|side| (side.network.now(), side.recorder.1)))
     }
 
-    /// Lays side by side what both have done until `passed`.
-    fn compare(&mut self, passed: Time) {
+    /// Lays side by side what both have done until `until`.
+    fn compare(&mut self, until: Time) {
+        let passed = self.passed;
         let [before, now] = &mut self.sides;
         let (before, now) = (&mut before.recorder.0, &mut now.recorder.0);
         for (station, found) in self.found.iter_mut().enumerate() {
@@ -180,13 +186,13 @@ impl<Q: Queue<NetworkEvent>, R: Recorder> Race<Q, R> {
             for strand in Strand::ALL {
                 let found = &mut found[strand as usize];
                 if found.is_none() {
-                    *found = first([before, now], address, strand, passed);
+                    *found = first([before, now], address, strand, (passed, until));
                 }
                 // A side that had nothing to show tells what it does next, if it does anything.
                 if let Some(found) = found {
                     for (side, tape) in [(&mut found.before, &mut *before), (&mut found.now, &mut *now)] {
                         if side.is_none() {
-                            *side = tape.pop(station, strand);
+                            *side = tape.pop(station, strand, until);
                         }
                         if side.is_some() {
                             tape.finish(station, strand);
@@ -198,17 +204,22 @@ impl<Q: Queue<NetworkEvent>, R: Recorder> Race<Q, R> {
     }
 }
 
-/// The first difference of a station in what both tapes have, which are complete until `passed`.
-fn first([before, now]: [&mut Tape; 2], address: Address, strand: Strand, passed: Time) -> Option<Difference> {
+/// The first difference of a station in what both tapes have until `until`, which are complete until `passed`.
+fn first(
+    [before, now]: [&mut Tape; 2],
+    address: Address,
+    strand: Strand,
+    (passed, until): (Time, Time),
+) -> Option<Difference> {
     let station = usize::from(address.get());
     loop {
-        let different = match (before.first(station, strand), now.first(station, strand)) {
+        let different = match (before.first(station, strand, until), now.first(station, strand, until)) {
             (Some(one), Some(other)) if one.agrees_with(other) => false,
             (Some(_), Some(_)) => true,
             (Some(alone), None) | (None, Some(alone)) if alone.at <= passed => true,
             _ => return None,
         };
-        let (before, now) = (before.pop(station, strand), now.pop(station, strand));
+        let (before, now) = (before.pop(station, strand, until), now.pop(station, strand, until));
         if different {
             return Some(Difference { station: address, before, now });
         }

@@ -1,8 +1,11 @@
 //! Tape: what each station of a run did and saw, kept until the other run has got there too.
+//!
+//! A telegram comes before its first bit, and is none if its sender loses the supply until then. So nothing counts before
+//! its instant has passed.
 
 use std::collections::VecDeque;
 
-use super::happening::Happening;
+use super::happening::{Happening, What};
 use crate::observation::Observation;
 use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::time::Time;
@@ -59,12 +62,13 @@ impl Tape {
     pub(super) const fn ended(&self) -> Option<Time> {
         self.ended
     }
-    /// The first happening of `station` in this strand.
-    pub(super) fn first(&self, station: usize, strand: Strand) -> Option<&Happening> {
-        self.lanes[station].waiting[strand as usize].front()
+    /// The first happening of `station` in this strand, if it is not later than `until`.
+    pub(super) fn first(&self, station: usize, strand: Strand, until: Time) -> Option<&Happening> {
+        self.lanes[station].waiting[strand as usize].front().filter(|happening| happening.at <= until)
     }
-    /// Takes the first one off.
-    pub(super) fn pop(&mut self, station: usize, strand: Strand) -> Option<Happening> {
+    /// Takes the same off.
+    pub(super) fn pop(&mut self, station: usize, strand: Strand, until: Time) -> Option<Happening> {
+        self.first(station, strand, until)?;
         self.lanes[station].waiting[strand as usize].pop_front()
     }
     /// Nothing more of this strand is wanted.
@@ -85,6 +89,12 @@ impl Tape {
 impl Recorder for Tape {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
         self.keep(telegram.sender, Strand::Everything, |cycle| Happening::of_telegram(cycle, telegram));
+    }
+    fn withdrawn(&mut self, sender: Address, now: Time) {
+        if self.ended.is_none() {
+            let stays = |happening: &Happening| happening.at <= now || !matches!(happening.what, What::Telegram { .. });
+            self.lanes[usize::from(sender.get())].waiting[Strand::Everything as usize].retain(stays);
+        }
     }
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         if let &Observation::CycleStart { cycle, .. } = what

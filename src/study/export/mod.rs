@@ -6,6 +6,7 @@
 pub mod capture;
 pub mod csv;
 pub mod decimal;
+mod directory;
 pub mod hlog;
 pub mod json;
 pub mod live_list;
@@ -17,6 +18,7 @@ pub mod vcd;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use directory::Directory;
 pub use staged::{ExportError, Staged};
 
 use super::histogram::Histograms;
@@ -71,19 +73,20 @@ pub const EXPORTERS: &[Exporter] = &[csv::EXPORTER, hlog::EXPORTER, live_list::E
 pub struct Exports {
     open: Vec<Box<dyn Export>>,
     names: Vec<String>,
+    /// The last to go: by then no file is left under its temporary name.
+    _directory: Directory,
 }
 
 impl Exports {
     /// Begins the files of `exporters`.
     ///
     /// # Errors
-    /// If the directory or a file cannot be made; no file stays then.
+    /// If the directory or a file cannot be made; neither stays then.
     pub fn open(target: &Target<'_>, exporters: &[Exporter]) -> Result<Self, ExportError> {
-        fs::create_dir_all(target.dir)
-            .map_err(|source| ExportError::Directory { path: target.dir.to_owned(), source })?;
+        let directory = Directory::make(target.dir)?;
         let open = exporters.iter().map(|exporter| (exporter.open)(target)).collect::<Result<_, _>>()?;
         let names = exporters.iter().flat_map(|exporter| (exporter.files)(target)).collect();
-        Ok(Self { open, names })
+        Ok(Self { open, names, _directory: directory })
     }
 
     /// The run is over: writes what is left and gives every file its name, those that are `staged` already included.
@@ -233,6 +236,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         drop(fed(dir.path()));
         assert!(names(dir.path()).is_empty(), "an interrupted run");
+        drop(fed(&dir.path().join("new/a")));
+        assert!(names(dir.path()).is_empty(), "an interrupted run with a directory of its own");
         fs::create_dir_all(dir.path().join("summary.json/occupied")).unwrap();
         let error = finish(fed(dir.path())).unwrap_err();
         assert!(matches!(&error, ExportError::Place { path, .. } if path.ends_with("summary.json")), "{error}");

@@ -124,6 +124,8 @@ pub enum Subject {
     Master,
     /// The slave at this address.
     Slave(Address),
+    /// The `[[class2]]` of this number, from 1, at this address.
+    Class2(usize, Address),
 }
 
 /// A key of a scenario.
@@ -148,6 +150,10 @@ impl Key {
     pub const fn slave(address: Address, name: &'static str) -> Self {
         Self { subject: Subject::Slave(address), name }
     }
+    /// A key of the `[[class2]]` of this number, from 1, at this address.
+    pub const fn class2(number: usize, address: Address, name: &'static str) -> Self {
+        Self { subject: Subject::Class2(number, address), name }
+    }
 }
 impl fmt::Display for Key {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -155,6 +161,7 @@ impl fmt::Display for Key {
             Subject::Bus => write!(f, "bus.{}", self.name),
             Subject::Master => write!(f, "master.{}", self.name),
             Subject::Slave(address) => write!(f, "slave.{address}.{}", self.name),
+            Subject::Class2(number, _) => write!(f, "class2.{number}.{}", self.name),
         }
     }
 }

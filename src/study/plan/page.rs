@@ -408,6 +408,7 @@ impl Line<'_> {
         match self.subjects.first() {
             Some(Subject::Bus) => "bus".to_owned(),
             Some(Subject::Slave(_)) => format!("slave {}", ranges(&slaves)),
+            Some(Subject::Class2(_, address)) => format!("class 2 master {address}"),
             _ => "master".to_owned(),
         }
     }

@@ -102,8 +102,11 @@ pub static SERVICES: &[Rule] = &[
     Rule::must("Data_Control_Time >= 6 x T_DP", "Model: D5", services::data_control_time),
 ];
 /// Acyclic services.
-pub static ACYCLIC: &[Rule] =
-    &[Rule::warning("octets of a record <= C1_Max_Data_Len, C2_Max_Data_Len", "GSD", services::acyclic_lengths)];
+pub static ACYCLIC: &[Rule] = &[
+    Rule::warning("octets of a record <= C1_Max_Data_Len, C2_Max_Data_Len", "GSD", services::acyclic_lengths),
+    Rule::warning("C2_Response_Timeout > n x T_DP", "Model: all slaves busy", services::class2_turns),
+    Rule::warning("T_TR > T_DP where MS2 is used", "EN 50170-2", services::class2_time).clocked(),
+];
 /// T_I, T_O and the window of every slave.
 pub static INSTANTS: &[Rule] = &[
     Rule::must("T_I = n x T_BASE_IO", "manual 3.3.4, 3.3.5", instants::t_i_grid).clocked(),
@@ -272,6 +275,7 @@ pub fn symbol(key: &'static str) -> &'static str {
         ("t_tr", "T_TR"),
         ("min_slave_interval", "Min_Slave_Interval"),
         ("data_control_time", "Data_Control_Time"),
+        ("response_timeout", "C2_Response_Timeout"),
         ("pll.min_window", "narrowest window"),
         ("pll.quantum", "timer step"),
     ];

@@ -53,20 +53,18 @@ const SINGLE: usize = 5;
 pub(in crate::study) const TABLES_OF_ONE: &[&str] = TABLES.split_at(SINGLE).0;
 
 /// A slave's table after its list of addresses has been written out: one per slave.
-struct SlaveTable {
-    address: Address,
+pub(super) struct SlaveTable {
+    pub(super) address: Address,
     /// Of the key that says the address.
     address_place: Place,
     place: Place,
-    table: Table,
+    pub(super) table: Table,
 }
 
 /// Reads everything. `None` if something is missing or wrong; the reader knows what.
 pub(super) fn scenario(reader: &mut Reader<'_>, mut root: Table) -> Option<Scenario> {
     unknown_tables(reader, &root);
-    overrides_of_groups(reader, &mut root);
-    let mut slave_tables = slave_tables(reader, &root);
-    overrides(reader, &mut root, &mut slave_tables);
+    let slave_tables = changed(reader, &mut root);
     let run = run(Section::of_file(reader, &root, "run"), reader);
     let bus = bus(Section::of_file(reader, &root, "bus"), reader);
     let rate = bus.map_or(BitRate::M12, |bus| bus.params.rate);
@@ -197,6 +195,14 @@ fn slave_tables(reader: &mut Reader<'_>, root: &Table) -> Vec<SlaveTable> {
     }
     all.dedup_by_key(|slave| slave.address);
     all
+}
+
+/// Puts every override where it belongs, and writes out the slaves.
+pub(super) fn changed(reader: &mut Reader<'_>, root: &mut Table) -> Vec<SlaveTable> {
+    overrides_of_groups(reader, root);
+    let mut slaves = slave_tables(reader, root);
+    overrides(reader, root, &mut slaves);
+    slaves
 }
 
 /// The addresses of one `[[slave]]` with the place that says so.

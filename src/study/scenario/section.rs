@@ -278,7 +278,8 @@ where
     }
 }
 
-/// A number with its unit, read by `read`; `example` shows one.
+/// A number with its unit, read by `read`; `example` shows one. An override has no quotation marks to tell a text by, so that
+/// a number there, such as a gain of 0.25 or a share of 1e-6, is read as one.
 pub(in crate::study) fn quantity<T>(
     example: &'static str,
     read: impl Fn(&str) -> Result<T, QuantityError>,
@@ -288,6 +289,9 @@ pub(in crate::study) fn quantity<T>(
             Err(Fault::new("this text is too long for a quantity").help(format!("such as \"{example}\"")))
         }
         Value::Text(text) => read(text).map_err(|error| Fault::new(error.to_string())),
+        Value::Integer(Some(_)) | Value::Fraction(_) if matches!(node.place, Place::Set(_)) => {
+            read(&node.value.literal()).map_err(|error| Fault::new(error.to_string()))
+        }
         other => Err(Fault::new(format!("this is {}", other.noun()))
             .help(format!("write a number with its unit in quotation marks, such as \"{example}\""))),
     }

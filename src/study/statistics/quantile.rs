@@ -7,7 +7,6 @@
 use super::beta::{Share, binomial_cdf};
 use super::bins::Counted;
 use super::confidence::Confidence;
-use crate::study::histogram::Histogram;
 
 /// A quantile and its bounds, in the unit of the values; no bound where the values are too few for one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -34,7 +33,8 @@ pub struct Ranks {
 impl Ranks {
     /// The ranks for the value that `percent` of all do not exceed; none without a value.
     ///
-    /// `percent` is brought into 0 ..= 100 and rounded to thousandths, as in [`Histogram::percentile`].
+    /// `percent` is brought into 0 ..= 100 and rounded to thousandths, as in
+    /// [`Histogram::percentile`](crate::study::histogram::Histogram::percentile).
     pub fn new(count: u64, percent: f64, confidence: Confidence) -> Option<Self> {
         const WHOLE: u32 = 100_000;
         let thousandths = (percent.clamp(0.0, 100.0) * 1_000.0).round() as u32;
@@ -70,9 +70,6 @@ impl Ranks {
             ..Self::new(count, percent, confidence)?
         })
     }
-    fn pick<V>(&self, value: impl Fn(u64) -> V) -> QuantileInterval<V> {
-        QuantileInterval { estimate: value(self.estimate), low: self.low.map(&value), high: self.high.map(&value) }
-    }
 }
 
 /// The largest number up to `end` for which `so` is, if it is for 0 and never again once it is not.
@@ -85,28 +82,8 @@ fn last(end: u64, so: impl Fn(u64) -> bool) -> u64 {
     low
 }
 
-/// The value that `percent` of `sorted` do not exceed; none without a value.
-///
-/// # Panics
-/// If the values are not in ascending order.
-pub fn of_sorted<V: PartialOrd + Copy>(
-    sorted: &[V],
-    percent: f64,
-    confidence: Confidence,
-) -> Option<QuantileInterval<V>> {
-    assert!(sorted.is_sorted(), "values are not in ascending order");
-    let ranks = Ranks::new(sorted.len() as u64, percent, confidence)?;
-    Some(ranks.pick(|rank| sorted[rank as usize - 1]))
-}
-
-/// The same of a histogram, in ticks of 1/12 ns: the estimate is its [`percentile`](Histogram::percentile).
-pub fn of_histogram(histogram: &Histogram, percent: f64, confidence: Confidence) -> Option<QuantileInterval<i64>> {
-    let ranks = Ranks::new(histogram.count(), percent, confidence)?;
-    let estimate = histogram.percentile(percent)?.ticks();
-    Some(of_counted(&histogram.counted(), &ranks, |_| estimate))
-}
-
-/// The same of bins in ascending order, which hold as many values as `ranks` are of.
+/// The quantile of values in bins in ascending order, which hold as many values as `ranks` are of; `estimate` is the value
+/// that stands for a bin.
 ///
 /// # Panics
 /// If they hold less.
@@ -134,6 +111,7 @@ pub(in crate::study) fn of_counted(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::histogram::Histogram;
     use crate::time::Span;
 
     fn ranks(count: u64, percent: f64) -> Ranks {
@@ -206,8 +184,18 @@ mod tests {
         }
     }
 
+    /// The same by sorting.
+    fn sorted(values: &[i64], percent: f64) -> QuantileInterval<i64> {
+        let Ranks { estimate, low, high } = ranks(values.len() as u64, percent);
+        let at = |rank: u64| values[rank as usize - 1];
+        QuantileInterval { estimate: at(estimate), low: low.map(at), high: high.map(at) }
+    }
+    fn binned(histogram: &Histogram, percent: f64) -> QuantileInterval<i64> {
+        of_counted(&histogram.counted(), &ranks(histogram.count(), percent), Counted::middle)
+    }
+
     #[test]
-    fn sorted_values_and_histograms_agree() {
+    fn sorted_values_and_bins_agree() {
         let mut values: Vec<i64> = (0..2_000).map(|i| i * 7_919 % 4_001 - 2_000).collect();
         let mut histogram = Histogram::new(Span::from_ms(1), true);
         for &value in &values {
@@ -215,11 +203,8 @@ mod tests {
         }
         values.sort_unstable();
         for percent in [0.0, 0.1, 5.0, 50.0, 99.0, 100.0] {
-            let exact = of_sorted(&values, percent, Confidence::USUAL);
-            assert_eq!(of_histogram(&histogram, percent, Confidence::USUAL), exact, "{percent}");
+            assert_eq!(binned(&histogram, percent), sorted(&values, percent), "{percent}");
         }
-        assert_eq!(of_sorted::<f64>(&[], 50.0, Confidence::USUAL), None);
-        assert_eq!(of_histogram(&Histogram::new(Span::from_ms(1), true), 50.0, Confidence::USUAL), None);
     }
 
     #[test]
@@ -231,16 +216,10 @@ mod tests {
             histogram.record(Span::from_ticks(value));
         }
         for percent in [10.0, 50.0, 90.0] {
-            let exact = of_sorted(&values, percent, Confidence::USUAL).unwrap();
-            let found = of_histogram(&histogram, percent, Confidence::USUAL).unwrap();
+            let (exact, found) = (sorted(&values, percent), binned(&histogram, percent));
             assert!(found.low <= exact.low && found.low.unwrap() > exact.low.unwrap() - 1_024, "{found:?}");
             assert!(found.high >= exact.high && found.high.unwrap() < exact.high.unwrap() + 1_024, "{found:?}");
         }
-        let found = of_histogram(&histogram, 99.0, Confidence::USUAL).unwrap();
-        assert_eq!(
-            (found.estimate, found.high),
-            (1_000_999, Some(1_000_999)),
-            "beyond the limit only the end is known"
-        );
+        assert_eq!(binned(&histogram, 99.0).high, Some(1_000_999), "beyond the limit only the end is known");
     }
 }

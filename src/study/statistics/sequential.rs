@@ -158,19 +158,6 @@ impl SequentialTest {
     pub const fn limit(&self) -> u64 {
         self.limit
     }
-    /// Wald's mean number of runs where the failure probability is `p0` and where it is `p1`, as if there were no limit.
-    pub fn mean_runs(&self) -> (f64, f64) {
-        let (low, high) = self.bounds;
-        // alpha and beta again, from the bounds.
-        let alpha = -libm::expm1(low) / (libm::exp(high) - libm::exp(low));
-        let beta = libm::exp(low) * (1.0 - alpha);
-        let mean = |p: f64, held: f64| {
-            let end = if held > 0.0 { held * low } else { 0.0 } + if held < 1.0 { (1.0 - held) * high } else { 0.0 };
-            let step = weighed(p, libm::log(self.p1 / self.p0)) + weighed(1.0 - p, self.gain());
-            (end / step).max(1.0)
-        };
-        if self.limit == 1 { (1.0, 1.0) } else { (mean(self.p0, 1.0 - alpha), mean(self.p1, beta)) }
-    }
 
     /// L after `failures` in `runs` runs.
     fn evidence(&self, failures: u64, runs: u64) -> f64 {
@@ -283,7 +270,6 @@ mod tests {
         let ask = |fails| SequentialTest::ONE_RUN.run(|_| Ok::<_, ()>(fails)).unwrap();
         assert_eq!(ask(false), Tested { verdict: Verdict::Holds, proven: true, runs: 1, failures: 0 });
         assert_eq!(ask(true), Tested { verdict: Verdict::Fails, proven: true, runs: 1, failures: 1 });
-        assert_eq!(SequentialTest::ONE_RUN.mean_runs(), (1.0, 1.0));
     }
 
     #[test]
@@ -296,7 +282,6 @@ mod tests {
         assert_eq!(certain.decide(0, 1), Decision::Proven(Verdict::Holds));
         let both = SequentialTest::new(SequentialSettings { p0: 0.0, p1: 1.0, ..SETTINGS }).unwrap();
         assert_eq!(both.decide(1, 2), Decision::Proven(Verdict::Fails));
-        assert!([test, certain, both].iter().all(|test| test.mean_runs().0.is_finite() && test.mean_runs().1 >= 1.0));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::{json, page, picture, table};
 use crate::study::export::{ExportError, Staged};
 use crate::study::quantity::{Measure, share};
 use crate::study::scenario::error::Problem;
-use crate::study::scenario::{Fault, Scenario, ScenarioError};
+use crate::study::scenario::{Fault, Scenario, ScenarioError, written};
 use crate::study::statistics::bisection::{Answer as Found, Search};
 use crate::study::statistics::confidence::Confidence;
 use crate::study::statistics::sequential::SequentialError;
@@ -34,8 +34,8 @@ pub struct Call {
     pub out: PathBuf,
     /// The key that is varied.
     pub vary: String,
-    /// Where the search begins: expected to hold.
-    pub from: String,
+    /// Where the search begins: expected to hold. Without it the scenario's own value of the key.
+    pub from: Option<String>,
     /// Where it ends: expected to fail.
     pub to: String,
     /// Distance of values.
@@ -112,8 +112,9 @@ impl From<ExportError> for ToleranceError {
 /// # Panics
 /// Never: a scale has two ends.
 pub fn tolerance(call: &Call, stop: &AtomicBool, mut watch: impl FnMut(Progress)) -> Result<Answer, ToleranceError> {
-    let (key, scale, demand) = (key(call)?, scale(call)?, demand(call)?);
+    let (key, demand) = (key(call)?, demand(call)?);
     let base = base(call)?;
+    let scale = scale(call, from(call, &base, &key)?)?;
     let mut sets = call.sets.clone();
     for text in &call.expects {
         sets.push(expectation(text)?);
@@ -147,6 +148,7 @@ pub fn tolerance(call: &Call, stop: &AtomicBool, mut watch: impl FnMut(Progress)
         source: base.source.clone(),
         key,
         scale: scale.clone(),
+        is_own: call.from.is_none(),
         sets: call.sets.clone(),
         seed: scenario.run.seed,
         expected,
@@ -176,14 +178,21 @@ fn write(outcome: &Outcome, dir: &std::path::Path) -> Result<Vec<String>, Tolera
     Ok(names.into())
 }
 
-/// `scale`, or a coarser one where the scenario takes the value next to the beginning on that alone.
+/// `scale`; a finer one where the scenario takes fractions between whole ends, or a coarser one where it takes the value next
+/// to the beginning on that alone.
 fn taken(base: &Base, sets: &[(String, String)], key: &str, scale: Scale) -> Scale {
     let takes = |scale: &Scale, number| {
         let mut sets = sets.to_vec();
         sets.push((key.to_owned(), scale.text(number)));
         base.with(&sets).is_ok()
     };
-    if !takes(&scale, 0) || takes(&scale, 1) {
+    if !takes(&scale, 0) {
+        return scale;
+    }
+    if let Some(finer) = scale.finer().filter(|finer| takes(finer, 1)) {
+        return finer;
+    }
+    if takes(&scale, 1) {
         return scale;
     }
     let coarser = scale.coarser().find(|coarser| takes(coarser, 1));
@@ -208,11 +217,25 @@ fn key(call: &Call) -> Result<String, ScenarioError> {
     Ok(key)
 }
 
-fn scale(call: &Call) -> Result<Scale, ScenarioError> {
-    let read = |option: &str, text: &str| -> Result<Measure, ScenarioError> {
-        measured(text).map_err(|fault| wrong(option, text, fault))
-    };
-    let (from, to) = (read("--from", &call.from)?, read("--to", &call.to)?);
+fn read(option: &str, text: &str) -> Result<Measure, ScenarioError> {
+    measured(text).map_err(|fault| wrong(option, text, fault))
+}
+
+/// Where the search begins.
+fn from(call: &Call, base: &Base, key: &str) -> Result<Measure, ScenarioError> {
+    if let Some(from) = &call.from {
+        return read("--from", from);
+    }
+    let own = written(&base.source, &base.text, &call.sets, key)?;
+    let about = |fault: Fault| wrong("--vary", key, fault.help("write --from VALUE, a value that is expected to hold"));
+    let own = own.ok_or_else(|| {
+        about(Fault::new(format!("{} does not set this key, so that the search has no beginning", base.source)))
+    })?;
+    measured(&own).map_err(|fault| about(Fault::new(format!("{} has {own} here: {}", base.source, fault.message))))
+}
+
+fn scale(call: &Call, from: Measure) -> Result<Scale, ScenarioError> {
+    let to = read("--to", &call.to)?;
     if let Some(step) = &call.step {
         let scale = Scale::stepped(from, to, read("--step", step)?);
         return scale.map_err(|fault| wrong("--step", step, fault));
@@ -281,7 +304,8 @@ fn blame(mut error: ScenarioError, call: &Call, key: &str, value: &str) -> Toler
     let varied = format!("--set \"{key}={value}\"");
     for Problem { source, .. } in &mut error.problems {
         if *source == varied {
-            *source = format!("--vary {key} --from \"{}\"", call.from);
+            let from = call.from.as_ref().map_or_else(String::new, |from| format!(" --from \"{from}\""));
+            *source = format!("--vary {key}{from}");
         } else if let Some(expected) = source.strip_prefix("--set \"expect.")
             && !call.sets.iter().any(|(key, value)| *source == format!("--set \"{key}={value}\""))
         {

@@ -24,6 +24,7 @@ pub(super) fn text(outcome: &Outcome) -> String {
         "key": outcome.key,
         "unit": scale.unit(),
         "from": value(0),
+        "from_scenario": outcome.is_own,
         "to": value(scale.last()),
         "step": scale.step().to_string(),
         "resolution": (scale.resolution() > 0.0).then(|| scale.resolution()),

@@ -76,6 +76,8 @@ pub struct Outcome {
     pub key: String,
     /// Its values.
     pub scale: Scale,
+    /// Whether it begins with the scenario's own value.
+    pub is_own: bool,
     /// What was set beside it, the seed included.
     pub sets: Vec<(String, String)>,
     /// Seed of the first run of every value.

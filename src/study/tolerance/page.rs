@@ -39,6 +39,9 @@ fn settings(outcome: &Outcome) -> Vec<String> {
         format!("in steps of {}", scale.step())
     };
     let mut lines = vec![format!("expected   {}", outcome.expected.join(", ")), format!("values     {grid}")];
+    if outcome.is_own {
+        lines.push(format!("begins     at {}, the scenario's own value", scale.ends().0));
+    }
     let sets: Vec<_> = outcome.sets.iter().map(|(key, value)| format!("{key}={value}")).collect();
     if !sets.is_empty() {
         lines.push(format!("changed    {}", sets.join(", ")));

@@ -6,7 +6,7 @@
 
 use crate::study::quantity::Measure;
 use crate::study::scenario::error::Fault;
-use crate::study::statistics::bisection::{Axis, SearchError};
+use crate::study::statistics::bisection::Axis;
 use crate::study::sweep::axis::{distance, like, measured, too_fine};
 
 /// Most values of a grid. Model: halving them takes 40 values to try.
@@ -50,12 +50,22 @@ impl Scale {
     /// The ends are not of one kind, or the grid has too many values.
     pub fn resolved(from: Measure, to: Measure, resolution: f64) -> Result<Self, Fault> {
         like(from, to)?;
+        let whole = !from.noun.is_empty() || [from, to].iter().all(|end| end.steps().1 == 1);
+        Self::gridded((from, to), resolution, whole)
+    }
+    fn gridded((from, to): (Measure, Measure), resolution: f64, whole: bool) -> Result<Self, Fault> {
         let ends = [from.value(), to.value_in(from)];
         let [small, large] = [ends[0].abs().min(ends[1].abs()), ends[0].abs().max(ends[1].abs())];
         let crosses = ends[0] * ends[1] <= 0.0;
         let fine = resolution * if crosses { 0.1 * large } else { small };
-        let whole = !from.noun.is_empty() || [from, to].iter().all(|end| end.steps().1 == 1);
         Self::new((from, to), round(fine, from, whole)?, resolution)
+    }
+    /// The same ends and resolution with fractions between them, where only whole numbers were: for a key that takes more
+    /// than those, such as a share from 0 to 1. Nothing where a step was asked for.
+    pub fn finer(&self) -> Option<Self> {
+        let finer = || Self::gridded((self.from, self.to), self.resolution, false).ok();
+        let whole = self.resolution > 0.0 && self.from.noun.is_empty() && self.step.steps().1 == 1;
+        finer().filter(|finer| whole && finer.step.steps().1 > 1)
     }
     fn new((from, to): (Measure, Measure), step: Measure, resolution: f64) -> Result<Self, Fault> {
         let quotient = distance(from, to).and_then(|(above, below)| {
@@ -165,7 +175,7 @@ impl Scale {
 /// step of its kind where values are `whole`.
 fn round(fine: f64, like: Measure, whole: bool) -> Result<Measure, Fault> {
     /// Decimals of the finest.
-    const DECIMALS: i32 = 12;
+    const DECIMALS: i32 = 15;
     let first = libm::floor(libm::log10(fine.max(1e-30))) as i32;
     for exponent in (-DECIMALS..=first).rev() {
         for digit in [5_u8, 2, 1] {
@@ -177,22 +187,20 @@ fn round(fine: f64, like: Measure, whole: bool) -> Result<Measure, Fault> {
             let step = Measure::read(format!("{number} {}", like.unit).trim());
             let fits = |step: &Measure| step.value() <= fine * (1.0 + 1e-9) && (!whole || step.steps().1 == 1);
             if let Some(step) = step.filter(fits) {
-                return Ok(step);
+                // Written as the ends are.
+                return like.with_steps(step.steps()).ok_or_else(too_fine);
             }
         }
     }
     if whole {
         like.with_steps((1, 1)).ok_or_else(too_fine)
     } else {
-        measured(&format!("0.000000000001 {}", like.unit))
+        measured(&format!("0.000000000000001 {}", like.unit))
     }
 }
 
 impl Axis for &Scale {
     type Value = i64;
-    fn check(&self, _: i64, _: i64, _: i64) -> Result<(), SearchError> {
-        Ok(())
-    }
     fn neighbours(&self, a: i64, b: i64) -> bool {
         let (x, y) = (self.value(a), self.value(b));
         a.abs_diff(b) <= 1 || (x - y).abs() <= self.resolution * x.abs().max(y.abs())
@@ -263,6 +271,8 @@ mod tests {
             ("1 ppm", "500 ppm", 0.01, "0.01 ppm"),
             ("-50 ppm", "50 ppm", 0.01, "0.05 ppm"),
             ("0.1 %", "10 %", 0.02, "0.002 %"),
+            ("1/4", "1/64", 0.01, "0.0001"),
+            ("1e-12", "1e-9", 0.01, "1e-14"),
         ] {
             let scale = resolved(from, to, resolution);
             assert_eq!(scale.step().to_string(), measure(step).to_string(), "{from} {to}");
@@ -313,6 +323,17 @@ mod tests {
         assert!(steps("1 us", "2 us").contains(&"1000 tick".to_owned()));
         assert_eq!(steps("1", "9"), ["2", "5"]);
         assert_eq!(stepped("1 ms", "9 ms", "1 ms").unwrap().coarser().count(), 0);
+    }
+
+    #[test]
+    fn whole_ends_without_a_unit_may_have_fractions_between_them() {
+        let step = |from, to| resolved(from, to, 0.01).finer().map(|scale| scale.step().to_string());
+        assert_eq!(step("0", "1").as_deref(), Some("0.001"));
+        assert_eq!(step("1", "14").as_deref(), Some("0.01"));
+        for (from, to) in [("0.5", "1"), ("1/4", "1"), ("0 ns", "1 us"), ("100", "10000")] {
+            assert_eq!(step(from, to), None, "{from} {to}");
+        }
+        assert_eq!(stepped("0", "9", "1").unwrap().finer(), None);
     }
 
     #[test]

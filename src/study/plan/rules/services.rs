@@ -3,8 +3,11 @@
 use super::{Facts, Findings};
 use crate::device::parameters::PARAMETERS;
 use crate::device::tool::Work;
-use crate::study::plan::finding::{Key, Relation};
-use crate::study::scenario::{Action, Fault, Scenario, Slave};
+use crate::dp::ms2::TIMEOUT_UNIT;
+use crate::study::plan::finding::{Amount, Key, Relation};
+use crate::study::scenario::{Action, Class2, Fault, Scenario, Slave};
+use crate::time::{Span, Tbit};
+use crate::wire::Address;
 use crate::wire::parameter::Format;
 
 /// Shortest Data_Control_Time in cycles. Model: D5, its third is two cycles or more, since not every cycle has time to
@@ -100,5 +103,62 @@ pub(super) fn acyclic_lengths(facts: &Facts<'_>, found: &mut Findings) {
             });
             found.of("octets of the longest record", None);
         }
+    }
+}
+
+/// The slaves of the jobs of a class 2 master, each once, and the shortest C2_Response_Timeout of those that it asks over
+/// MS2; none if it asks nobody over MS2.
+fn asked(scenario: &Scenario, class2: &Class2) -> Option<(usize, Span)> {
+    let mut all: Vec<Address> = class2.jobs.iter().flat_map(|job| job.slaves.iter().copied()).collect();
+    all.sort_unstable();
+    all.dedup();
+    let over_ms2 = class2.jobs.iter().filter(|job| job.works.iter().any(|work| !matches!(work, Work::Read(_))));
+    let slaves = over_ms2.flat_map(|job| &job.slaves).filter_map(|&address| scenario.slave(address));
+    let timeout = slaves.map(|slave| class2.response_timeout.unwrap_or(slave.device.c2.response_timeout)).min()?;
+    Some((all.len(), timeout))
+}
+
+/// A class 2 master asks for an answer before it gives the request up. Model: slaves take turns, a message each; a request
+/// and the first poll for its answer are as many messages apart as there are slaves with something to do, the token comes
+/// once in a cycle, and T_TH has time for all messages of a visit. No shorter C2_Response_Timeout does where all are busy.
+pub(super) fn class2_turns(facts: &Facts<'_>, found: &mut Findings) {
+    let scenario = facts.scenario;
+    for (number, class2) in (1..).zip(&scenario.class2) {
+        let Some((slaves, timeout)) = asked(scenario, class2) else { continue };
+        let visits = slaves.div_ceil(class2.per_token.into()) as i64;
+        let (cycle, turn) = (scenario.cycle_symbol(), scenario.master.t_dp * visits);
+        let enough = TIMEOUT_UNIT * (turn.div_floor(TIMEOUT_UNIT) + 1);
+        let key = Key::class2(number, class2.address, "response_timeout");
+        found.check(key, timeout, Relation::MoreThan, (format!("{visits} x {cycle}"), turn), || {
+            Fault::new(format!(
+                "the class 2 master {} may give a request up after {timeout}, before it has polled for the answer",
+                class2.address
+            ))
+            .rule(format!(
+                "C2_Response_Timeout > {visits} x {cycle} = {turn}: {slaves} slaves take turns, {} of them with each token \
+                 (Model: all slaves busy)",
+                class2.per_token
+            ))
+            .help(format!("response_timeout = \"{enough}\" or more, more messages per_token, or fewer slaves"))
+        });
+        found.of("C2_Response_Timeout", Some(Amount::Time(enough)));
+    }
+}
+
+/// Whoever asks over MS2 does so with low priority, and so in T_TH alone, which is what T_TR leaves of a rotation. The
+/// token comes to each station once in T_DP.
+pub(super) fn class2_time(facts: &Facts<'_>, found: &mut Findings) {
+    let (scenario, bus) = (facts.scenario, &facts.scenario.bus.params);
+    let t_dp = scenario.master.t_dp;
+    for class2 in scenario.class2.iter().filter(|class2| asked(scenario, class2).is_some()) {
+        let bound = Tbit(t_dp.ceil_to(bus.rate.bit()).div_floor(bus.rate.bit()) as u32);
+        found.check(Key::bus("t_tr"), bus.t_tr, Relation::MoreThan, ("T_DP", bound), || {
+            Fault::new(format!(
+                "T_TR = {} leaves the class 2 master {} no time for any request over MS2",
+                bus.t_tr, class2.address
+            ))
+            .rule(format!("T_TR > T_DP = {bound}: T_TH = T_TR - T_RR, and the token takes T_DP (EN 50170-2)"))
+            .help("a longer t_tr")
+        });
     }
 }

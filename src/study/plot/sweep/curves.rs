@@ -66,7 +66,7 @@ impl Curves {
             legend(canvas, &mut area, &keys);
             let points = || shown.iter().flat_map(|curve| &curve.points);
             let (lo, hi) = ends(points().flat_map(|point| {
-                let (low, high) = point.bounds.unwrap_or((point.mean, point.mean));
+                let (low, high) = self.band(point).unwrap_or((point.mean, point.mean));
                 [low, point.mean, high]
             }));
             // A figure that is never negative keeps its zero in sight unless it is far away.
@@ -75,7 +75,7 @@ impl Curves {
             for (index, curve) in shown.iter().enumerate() {
                 let (colour, shape) = series(index);
                 let at = |point: &Point, value: f64| chart.at(self.x.place(point.value), value);
-                let banded: Vec<_> = curve.points.iter().filter_map(|point| Some((point, point.bounds?))).collect();
+                let banded: Vec<_> = curve.points.iter().filter_map(|point| Some((point, self.band(point)?))).collect();
                 let over = banded.iter().map(|(point, (_, high))| at(point, *high));
                 let under = banded.iter().rev().map(|(point, (low, _))| at(point, *low));
                 if banded.len() > 1 {
@@ -90,6 +90,16 @@ impl Curves {
         })
     }
 
+    /// The bounds of `point` as far as the figure can go: no count and no share is negative, and no share is above 100 %.
+    /// The interval of a mean, which is symmetric, does not know that; tables have it as it was reckoned.
+    fn band(&self, point: &Point) -> Option<(f64, f64)> {
+        let (least, most) = match self.sheet.unit.as_str() {
+            "" => (0.0, f64::INFINITY),
+            "%" => (0.0, 100.0),
+            _ => (f64::NEG_INFINITY, f64::INFINITY),
+        };
+        point.bounds.map(|(low, high)| (low.max(least), high.min(most)))
+    }
     fn axis(&self) -> Axis {
         let (lo, hi) = ends((0..self.x.labels.len()).map(|index| self.x.place(index)));
         if self.x.is_logarithmic() {
@@ -97,5 +107,43 @@ impl Curves {
         } else {
             Axis::airy(self.x.name.clone(), lo, hi)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three values whose means have these bounds, as a picture.
+    fn drawn(unit: &str, means: [f64; 3], bounds: [(f64, f64); 3]) -> String {
+        let sheet = Sheet {
+            sweep: "s".to_owned(),
+            base: "s.toml".to_owned(),
+            figure: "faults".to_owned(),
+            unit: unit.to_owned(),
+            runs: 9,
+            confidence: "95 %".to_owned(),
+        };
+        let labels: Vec<_> = ["1", "2", "3"].map(str::to_owned).into();
+        let x = Parameter { name: "n".to_owned(), labels, numbers: Some(vec![1.0, 2.0, 3.0]) };
+        let point = |value: usize| Point { value, mean: means[value], bounds: Some(bounds[value]) };
+        let curves = vec![Curve { label: String::new(), points: (0..3).map(point).collect() }];
+        Curves { sheet, x, curves }.draw().expect("a picture")
+    }
+
+    #[test]
+    fn bands_end_where_counts_and_shares_do() {
+        let (few, over, cut) =
+            ([0.2, 1.0, 4.0], [(-0.3, 0.7), (-1.0, 3.0), (1.0, 7.0)], [(0.0, 0.7), (0.0, 3.0), (1.0, 7.0)]);
+        assert_eq!(drawn("", few, over), drawn("", few, cut));
+        assert_eq!(drawn("%", few, over), drawn("%", few, cut));
+        assert_ne!(drawn("us", few, over), drawn("us", few, cut), "a time may be negative");
+        let (most, over, cut) = (
+            [50.0, 99.0, 99.9],
+            [(40.0, 60.0), (96.0, 102.0), (99.5, 100.3)],
+            [(40.0, 60.0), (96.0, 100.0), (99.5, 100.0)],
+        );
+        assert_eq!(drawn("%", most, over), drawn("%", most, cut));
+        assert_ne!(drawn("", most, over), drawn("", most, cut), "a count has no end");
     }
 }

@@ -1,11 +1,10 @@
 //! Disturbances of the master's application: its sign of life, and what it parameterises slaves with.
 
-use super::station::{STATION, STATIONS, targets};
+use super::station::{STATION, STATIONS, about_stations, targets};
 use super::{DisturbanceKind, Key};
 use crate::sim::fault::What;
 use crate::sim::fault::order::OrderFault;
 use crate::study::plan::rules::Facts;
-use crate::study::scenario::check::about;
 use crate::study::scenario::error::Fault;
 use crate::study::scenario::kinds::patch;
 use crate::study::scenario::section::{Reader, Section, number};
@@ -79,8 +78,7 @@ pub(in crate::study::scenario) fn are_slaves(facts: &Facts<'_>, reader: &mut Rea
         if let Some(address) = stations.iter().find(no_slave) {
             let fault = Fault::new(format!("station {address} is not a slave of a master"))
                 .rule("a sign of life and parameters go to slaves that exchange data (manual 2.1)");
-            let path = format!("disturbance.{}", i + 1);
-            about(reader, &format!("{path}.station"), &[&format!("{path}.stations")], fault);
+            about_stations(reader, i, fault);
         }
     }
 }

@@ -81,6 +81,12 @@ fn many(node: &Node, slaves: &[Address]) -> Result<Vec<Address>, Fault> {
     }
 }
 
+/// Complains about the stations that disturbance number `index`, from 0, means.
+pub(super) fn about_stations(reader: &mut Reader<'_>, index: usize, fault: Fault) {
+    let path = format!("disturbance.{}", index + 1);
+    about(reader, &format!("{path}.station"), &[&format!("{path}.stations")], fault);
+}
+
 /// A master without supply begins no cycles, so that its return cannot be counted in them.
 pub(in crate::study::scenario) fn come_back(facts: &Facts<'_>, reader: &mut Reader<'_>) {
     let master = facts.scenario.master.address;
@@ -109,8 +115,7 @@ pub(in crate::study::scenario) fn are_there(facts: &Facts<'_>, reader: &mut Read
             let known: Vec<_> = known.iter().map(ToString::to_string).collect();
             let fault = Fault::new(format!("there is no station {address}"))
                 .help(format!("the stations are {}", known.join(", ")));
-            let path = format!("disturbance.{}", i + 1);
-            about(reader, &format!("{path}.station"), &[&format!("{path}.stations")], fault);
+            about_stations(reader, i, fault);
         }
     }
 }

@@ -1,11 +1,10 @@
 //! Disturbances of the ring: a master that keeps the token too long.
 
-use super::station::{STATION, STATIONS, targets};
+use super::station::{STATION, STATIONS, about_stations, targets};
 use super::{DisturbanceKind, Key};
 use crate::sim::fault::What;
 use crate::sim::fault::order::OrderFault;
 use crate::study::plan::rules::Facts;
-use crate::study::scenario::check::about;
 use crate::study::scenario::error::Fault;
 use crate::study::scenario::section::{Reader, instant};
 
@@ -30,8 +29,7 @@ pub(in crate::study::scenario) fn are_masters(facts: &Facts<'_>, reader: &mut Re
         if let Some(address) = stations.iter().find(|&&address| scenario.slave(address).is_some()) {
             let fault = Fault::new(format!("station {address} is a slave"))
                 .rule("the token goes from master to master (EN 50170-2)");
-            let path = format!("disturbance.{}", i + 1);
-            about(reader, &format!("{path}.station"), &[&format!("{path}.stations")], fault);
+            about_stations(reader, i, fault);
         }
     }
 }
