@@ -34,7 +34,7 @@ impl Tail {
         };
         let value = if self.signed { "magnitude" } else { "value" };
         let subtitle = format!(
-            "Sweep {}: share of all cycles whose {value} is above the one below, down to the largest seen.{few}",
+            "Sweep {}: share of all cycles whose {value} is above that on the axis, down to the largest seen.{few}",
             self.sheet.sweep
         );
         let title = format!("{}: how often a {value} is exceeded", self.sheet.figure);
@@ -46,8 +46,10 @@ impl Tail {
             let (lo, hi) = ends(points().map(|point| point.0));
             let rarest = points().map(|point| point.1).filter(|&share| share > 0.0).fold(1.0, f64::min);
             let name = if self.signed { format!("magnitude of {}", self.sheet.axis()) } else { self.sheet.axis() };
-            let x = Axis::airy(name, lo, hi);
-            let left = x.lo;
+            let airy = Axis::airy(name, lo, hi);
+            // Nothing is below zero.
+            let left = airy.lo.max(0.0);
+            let x = Axis { lo: left, ..airy };
             // The last step of a line goes down to the end of the axis.
             let floor = 100.0 * rarest / 2.0;
             let chart = Chart::draw(canvas, area, x, Axis::logarithm("share of cycles above [%]", floor, 100.0));
