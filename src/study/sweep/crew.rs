@@ -1,8 +1,11 @@
 //! Crew: threads that share jobs out among themselves, one after the other, and hand in what they made.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, mpsc};
+use std::sync::mpsc;
 use std::thread;
+
+use rayon::ThreadPoolBuilder;
+use rayon::iter::{ParallelBridge, ParallelIterator};
 
 /// Results that wait to be taken, per thread.
 const WAITING: usize = 64;
@@ -18,6 +21,9 @@ pub fn cores() -> usize {
 ///
 /// # Errors
 /// Whatever `take` says.
+///
+/// # Panics
+/// If the machine has no thread left.
 pub(in crate::study) fn share<W, J: Copy + Send, R: Send, E>(
     (threads, jobs): (usize, impl Iterator<Item = J> + Send),
     stop: &AtomicBool,
@@ -27,25 +33,19 @@ pub(in crate::study) fn share<W, J: Copy + Send, R: Send, E>(
 ) -> Result<(), E> {
     let most = jobs.size_hint().1.unwrap_or(usize::MAX);
     let threads = threads.min(most).max(1);
-    let (jobs, worker, does) = (&Mutex::new(jobs), &worker, &does);
-    thread::scope(|scope| {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a machine has threads");
+    let (worker, does) = (&worker, &does);
+    pool.in_place_scope(|scope| {
         let (sender, receiver) = mpsc::sync_channel(threads * WAITING);
-        for _ in 0..threads {
-            let sender = sender.clone();
-            scope.spawn(move || {
-                let mut worker = worker();
-                while !stop.load(Ordering::Relaxed) {
-                    // Whoever finds the lock poisoned stops: the panic of the other thread is told when all have ended.
-                    let Some(job) = jobs.lock().ok().and_then(|mut jobs| jobs.next()) else { break };
-                    let made = does(&mut worker, job);
-                    // Nobody takes it where taking has failed.
-                    if made.is_none_or(|made| sender.send((job, made)).is_err()) {
-                        break;
-                    }
-                }
-            });
-        }
-        drop(sender);
+        scope.spawn(move |_| {
+            // Nothing made of one job ends all threads, each after the job that it is at. So does a result that nobody
+            // takes, where taking has failed.
+            let one = |worker: &mut W, job| {
+                let made = if stop.load(Ordering::Relaxed) { None } else { does(worker, job) };
+                sender.send((job, made?)).ok()
+            };
+            let _all_done: Option<()> = jobs.par_bridge().try_for_each_init(worker, one);
+        });
         receiver.into_iter().try_for_each(|(job, made)| take(job, made))
     })
 }
