@@ -452,6 +452,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.tell(index, &Observation::Power { on }, recorder);
     }
     /// Tells what happened to a station and was not its own doing.
+    #[inline(never)]
     fn tell<R: Recorder>(&self, slot: usize, what: &Observation, recorder: &mut R) {
         let Slot { address, site, .. } = &self.slots[slot];
         recorder.observe(Stamp { at: self.now, station: *address, crystal: &site.crystal }, what);

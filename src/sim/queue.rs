@@ -251,11 +251,29 @@ impl<E: Copy> NearQueue<E> {
     /// Puts an event that is not the next of all at its place.
     #[inline(never)]
     fn put(&mut self, key: Key, event: E) {
-        if self.date == i64::MAX && self.today.len() >= FEW {
-            self.spread_out();
+        if self.date < i64::MAX {
+            self.put_by_day(key, event);
+        } else {
+            self.put_among_few(key, event);
         }
-        self.put_by_day(key, event);
     }
+    /// The same while today does not end.
+    #[inline(never)]
+    fn put_among_few(&mut self, key: Key, event: E) {
+        if self.today.len() >= FEW {
+            self.spread_out();
+            return self.put_by_day(key, event);
+        }
+        self.today.push((key, event));
+        let mut place = self.today.len() - 1;
+        while place > 0 && self.today[place - 1].0 < key {
+            self.today[place] = self.today[place - 1];
+            place -= 1;
+        }
+        self.today[place] = (key, event);
+    }
+    /// The same once there are days.
+    #[inline(never)]
     fn put_by_day(&mut self, key: Key, event: E) {
         let day = day(key);
         if day <= self.date {

@@ -244,7 +244,8 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
     }
     /// Takes what a slave observes in every cycle in which all is well: it is in the rows and in no count. Whether it was
     /// that.
-    #[inline]
+    #[allow(clippy::inline_always)] // See `observe`.
+    #[inline(always)]
     fn routine(&mut self, index: usize, at: Time, what: &Observation) -> bool {
         let slave = &mut self.slaves[index];
         match *what {

@@ -109,6 +109,7 @@ impl Alarms {
     /// Looks at all that may come by `limit`. If [`next`](Self::next) is not later than that now, one comes then.
     pub(super) fn look<'a>(&mut self, limit: Time, now: Time, crystal: impl Fn(usize) -> &'a Crystal) {
         let Self { all, users, nexts, .. } = self;
+        let mut first = Time::MAX;
         for (which, (next, users)) in nexts.iter_mut().zip(users).enumerate() {
             if *next <= limit {
                 *next = users.iter().fold(Time::MAX, |next, &slot| {
@@ -116,8 +117,9 @@ impl Alarms {
                     all[slot][which].look(crystal(slot), now).min(next)
                 });
             }
+            first = first.min(*next);
         }
-        self.next = nexts.iter().fold(Time::MAX, |first, &next| first.min(next));
+        self.next = first;
     }
     /// Which one comes first: slot, number and reading. Of several at one instant the one with the least `rank`, then the
     /// one with the least number.
