@@ -3,6 +3,9 @@
 //! A telegram reaches a listener after the delay of the path between the two. Where a link on the path has jitter, each
 //! telegram draws once from that link's stream, however many listen: whoever is behind the link hears the same.
 
+// See `network`.
+#![allow(clippy::inline_always)]
+
 use crate::fdl::Route;
 use crate::sim::cut::Cuts;
 use crate::sim::noise::LinkJitter;
@@ -52,6 +55,34 @@ pub struct Flight {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FlightId(u16);
 
+impl FlightId {
+    /// The name of this number.
+    #[inline]
+    pub const fn of(number: u32) -> Self {
+        Self(number as u16)
+    }
+    /// Its number.
+    #[inline]
+    pub const fn number(self) -> u32 {
+        self.0 as u32
+    }
+}
+
+/// What decides when a telegram reaches its listeners.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Wave {
+    /// The telegram.
+    pub id: FlightId,
+    /// Index of the sending station.
+    pub sender: usize,
+    /// First bit at the sender.
+    pub start: Time,
+    /// Last bit at the sender.
+    pub end: Time,
+    /// Number of the telegram, counted on the line.
+    pub number: u64,
+}
+
 /// Telegrams kept for telling whether the line is busy somewhere: more are never near each other. A power of two.
 const RECENT: usize = 8;
 
@@ -75,8 +106,9 @@ pub struct Bus {
     free: Vec<FlightId>,
     /// Telegrams sent.
     sent: u64,
-    /// The telegrams sent last, each at the place of its number.
+    /// The telegrams sent last, each at the place of its number among so many.
     recent: Vec<Sent>,
+    kept: usize,
     cuts: Cuts,
     /// From here on nothing is on the line, and a telegram may begin.
     clear_from: Time,
@@ -94,20 +126,17 @@ impl Bus {
             free: Vec::new(),
             sent: 0,
             recent: Vec::new(),
+            kept: RECENT,
             cuts: Cuts::none(),
             clear_from: Time::ZERO,
             t_syn: Span::ZERO,
         }
     }
-    /// The same whose cables may be cut.
+    /// The same whose cables may be cut. Where the line can be in parts, each part needs room for a long telegram beside the
+    /// short ones of the others: 255 characters last as long as 50 tokens with their pauses.
     #[must_use]
     pub fn with_cuts(self, cuts: Cuts) -> Self {
-        Self { cuts, ..self }
-    }
-    /// Telegrams kept. Where the line can be in parts, each part needs room for a long telegram beside the short ones of
-    /// the others: 255 characters last as long as 50 tokens with their pauses.
-    const fn kept(&self) -> usize {
-        if self.cuts.is_empty() { RECENT } else { RECENT * 8 }
+        Self { kept: if cuts.is_empty() { RECENT } else { RECENT * 8 }, cuts, ..self }
     }
     /// The disturbance called `name` cuts the cable at this place from now on, or it is whole again.
     pub fn cut(&mut self, (name, place): (&str, Place), open: bool, now: Time) {
@@ -153,14 +182,10 @@ impl Bus {
         self
     }
 
-    /// Puts a telegram of `sender`, or at its place, on the line. Returns its name, and the station it overlaps with, if any.
-    pub fn send(
-        &mut self,
-        sender: usize,
-        (start, end): (Time, Time),
-        frame: &Frame,
-        mark: Mark,
-    ) -> (FlightId, Option<usize>) {
+    /// Puts a telegram of `sender`, or at its place, on the line. Returns how it spreads, and the station it overlaps with, if
+    /// any.
+    #[inline(always)]
+    pub fn send(&mut self, sender: usize, (start, end): (Time, Time), frame: &Frame, mark: Mark) -> (Wave, Option<u8>) {
         let id = match self.free.pop() {
             Some(id) => id,
             None => self.add_flight(mark),
@@ -168,16 +193,28 @@ impl Bus {
         let flight = &mut self.flights[usize::from(id.0)];
         flight.frame.copy_from(frame);
         (flight.start, flight.end, flight.sender, flight.listeners) = (start, end, sender, 0);
-        (flight.mark, flight.number) = (mark, self.sent);
-        if !self.jitter.is_empty() {
-            flight.strays.clear();
-            flight.strays.extend(self.jitter.iter_mut().map(LinkJitter::draw));
-        }
+        let wave = Wave { id, sender, start, end, number: self.sent };
+        (flight.mark, flight.number) = (mark, wave.number);
         let hit = if start < self.clear_from { self.collide(id) } else { None };
-        self.remember(id);
-        self.sent += 1;
+        // For `is_busy`, instead of the oldest kept.
+        match self.recent.get_mut(wave.number as usize & (self.kept - 1)) {
+            Some(kept) => (kept.start, kept.end, kept.sender, kept.apart) = (start, end, sender, mark.apart),
+            None => self.recent.push(Sent { start, end, sender, strays: Vec::new(), apart: mark.apart }),
+        }
+        if !self.jitter.is_empty() {
+            self.stray(id);
+        }
+        self.sent = wave.number + 1;
         self.clear_from = self.clear_from.max(if mark.apart { end + self.t_syn } else { end });
-        (id, hit)
+        (wave, hit)
+    }
+    /// Draws what the links with jitter make of the telegram that is sent.
+    #[cold]
+    fn stray(&mut self, id: FlightId) {
+        let flight = &mut self.flights[usize::from(id.0)];
+        flight.strays.clear();
+        flight.strays.extend(self.jitter.iter_mut().map(LinkJitter::draw));
+        self.recent[self.sent as usize & (self.kept - 1)].strays.clone_from(&flight.strays);
     }
     /// Room for one more telegram under way.
     #[cold]
@@ -189,7 +226,7 @@ impl Bus {
     /// Overlapping characters fail their parity, and so receivers drop all telegrams that overlap with this one. What is
     /// apart spoils the idle time before a request too. Returns the sender of one that overlaps, the one that ends last.
     #[cold]
-    fn collide(&mut self, id: FlightId) -> Option<usize> {
+    fn collide(&mut self, id: FlightId) -> Option<u8> {
         let Flight { start, end, sender, mark, ref frame, .. } = self.flights[usize::from(id.0)];
         let needs_idle = begins_with_idle(frame.octets());
         let Self { flights, recent, cuts, t_syn, .. } = self;
@@ -211,21 +248,7 @@ impl Bus {
         };
         let broken = hit.is_some() || recent.iter().any(spoils);
         flights[usize::from(id.0)].mark.broken |= broken;
-        hit
-    }
-    /// Keeps the telegram for [`Self::is_busy`] instead of the oldest kept.
-    fn remember(&mut self, id: FlightId) {
-        let kept = self.kept();
-        let &Flight { start, end, sender, ref strays, mark: Mark { apart, .. }, .. } = &self.flights[usize::from(id.0)];
-        match self.recent.get_mut(self.sent as usize & (kept - 1)) {
-            Some(kept) => {
-                (kept.start, kept.end, kept.sender, kept.apart) = (start, end, sender, apart);
-                if !strays.is_empty() {
-                    kept.strays.clone_from(strays);
-                }
-            }
-            None => self.recent.push(Sent { start, end, sender, strays: strays.clone(), apart }),
-        }
+        hit.map(|sender| sender as u8)
     }
     /// The station `sender` lost its supply at `now`: what it would have sent later never reaches the line. What is
     /// under way is finished (Model: a telegram that breaks off would be dropped all the same).
@@ -260,20 +283,24 @@ impl Bus {
             self.free.push(id);
         }
     }
-    /// When the telegram's last bit reaches the station `listener`, and the number of the telegram.
+    /// How a telegram spreads.
     #[inline]
-    pub fn arrival(&self, id: FlightId, listener: usize) -> (Time, u64) {
+    pub fn wave(&self, id: FlightId) -> Wave {
+        let &Flight { start, end, sender, number, .. } = self.flight(id);
+        Wave { id, sender, start, end, number }
+    }
+    /// When a telegram's last bit reaches the station `listener`.
+    #[inline]
+    pub fn arrival(&self, wave: &Wave, listener: usize) -> Time {
         if !self.delays.is_steady() {
-            return self.strayed_arrival(id, listener);
+            return self.strayed_arrival(wave, listener);
         }
-        let flight = self.flight(id);
-        (flight.end + self.delays.nominal(flight.sender, listener), flight.number)
+        wave.end + self.delays.nominal(wave.sender, listener)
     }
     /// The same with the jitter of links, out of the way of networks that have none.
     #[cold]
-    fn strayed_arrival(&self, id: FlightId, listener: usize) -> (Time, u64) {
-        let flight = self.flight(id);
-        (flight.end + self.delays.of(flight.sender, listener, &flight.strays), flight.number)
+    fn strayed_arrival(&self, wave: &Wave, listener: usize) -> Time {
+        wave.end + self.delays.of(wave.sender, listener, &self.flight(wave.id).strays)
     }
     /// Whether the station `listener` sees characters at `now`.
     pub fn is_busy(&self, now: Time, listener: usize) -> bool {
@@ -315,16 +342,16 @@ mod tests {
     #[test]
     fn telegrams_that_overlap_are_both_garbled_and_those_that_follow_are_not() {
         let mut bus = line();
-        let (a, clean) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
+        let (Wave { id: a, .. }, clean) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
         bus.expect_listeners(a, 1);
-        let (b, hit) = bus.send(1, (ns(99), ns(199)), &token(), Mark::OWN);
+        let (Wave { id: b, .. }, hit) = bus.send(1, (ns(99), ns(199)), &token(), Mark::OWN);
         bus.expect_listeners(b, 1);
         assert_eq!((clean, hit), (None, Some(0)));
         for id in [a, b] {
             assert!(bus.flight(id).mark.broken);
             bus.heard(id);
         }
-        let (c, hit) = bus.send(0, (ns(199), ns(299)), &token(), Mark::OWN);
+        let (Wave { id: c, .. }, hit) = bus.send(0, (ns(199), ns(299)), &token(), Mark::OWN);
         assert_eq!((hit, bus.flight(c).mark.broken), (None, false));
     }
 
@@ -332,7 +359,7 @@ mod tests {
     fn a_telegram_that_is_hit_twice_is_as_broken_and_one_that_fits_before_another_is_not_hit() {
         let mut bus = line();
         let mut put = |sender, from, to| {
-            let (id, hit) = bus.send(sender, (ns(from), ns(to)), &token(), Mark::OWN);
+            let (Wave { id, .. }, hit) = bus.send(sender, (ns(from), ns(to)), &token(), Mark::OWN);
             bus.expect_listeners(id, 1);
             (id, hit)
         };
@@ -351,7 +378,7 @@ mod tests {
         let mut answer = Frame::new();
         answer.set_short_ack();
         let mut put = |from, to, frame: &Frame, mark| {
-            let (id, hit) = bus.send(0, (ns(from), ns(to)), frame, mark);
+            let (Wave { id, .. }, hit) = bus.send(0, (ns(from), ns(to)), frame, mark);
             bus.expect_listeners(id, 1);
             assert_eq!(hit, None);
             id
@@ -370,12 +397,12 @@ mod tests {
     #[test]
     fn what_a_station_without_supply_had_planned_never_comes() {
         let mut bus = line();
-        let (running, _) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
+        let (Wave { id: running, .. }, _) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
         bus.expect_listeners(running, 1);
         bus.silence(0, ns(50));
         assert_eq!(bus.flight(running).frame.octets(), token().octets(), "under way, it is finished");
         bus.heard(running);
-        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token(), Mark::OWN);
+        let (Wave { id: planned, .. }, _) = bus.send(0, (ns(500), ns(600)), &token(), Mark::OWN);
         bus.expect_listeners(planned, 1);
         bus.silence(1, ns(300));
         assert!(!bus.flight(planned).frame.is_empty(), "another station's supply");
@@ -389,9 +416,10 @@ mod tests {
     #[test]
     fn a_receiver_sees_the_line_busy_one_delay_later() {
         let mut bus = line();
-        let (id, _) = bus.send(0, (ns(100), ns(200)), &token(), Mark::OWN);
+        let (wave, _) = bus.send(0, (ns(100), ns(200)), &token(), Mark::OWN);
+        assert_eq!((wave.number, bus.wave(wave.id)), (0, wave));
         assert_eq!([149, 150, 249, 250].map(|t| bus.is_busy(ns(t), 1)), [false, true, true, false]);
-        assert_eq!((bus.arrival(id, 0), bus.arrival(id, 1)), ((ns(200), 0), (ns(250), 0)));
+        assert_eq!((bus.arrival(&wave, 0), bus.arrival(&wave, 1)), (ns(200), ns(250)));
         // Forgotten when as many as are kept have followed.
         for _ in 0..RECENT {
             bus.send(1, (ns(1_000), ns(1_100)), &token(), Mark::OWN);
@@ -410,8 +438,8 @@ mod tests {
         let mut strays = Vec::new();
         for sender in [0, 1, 2].into_iter().cycle().take(300) {
             let start = ns(strays.len() as i64 * 1_000);
-            let (id, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token(), Mark::OWN);
-            let delay = |listener| bus.arrival(id, listener).0 - bus.flight(id).end;
+            let (wave, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token(), Mark::OWN);
+            let delay = |listener| bus.arrival(&wave, listener) - wave.end;
             let stray = expected.draw();
             let behind = Span::from_ns(100) + stray;
             let all = if sender < 2 {
@@ -422,10 +450,10 @@ mod tests {
             assert_eq!([0, 1, 2, 3].map(delay), all);
             let far = if sender < 2 { 3 } else { 0 };
             let tick = Span::from_ticks(1);
-            let seen = [start + behind - tick, start + behind, bus.arrival(id, far).0 - tick, bus.arrival(id, far).0];
+            let seen = [start + behind - tick, start + behind, bus.arrival(&wave, far) - tick, bus.arrival(&wave, far)];
             assert_eq!(seen.map(|now| bus.is_busy(now, far)), [false, true, true, false]);
-            bus.expect_listeners(id, 1);
-            bus.heard(id);
+            bus.expect_listeners(wave.id, 1);
+            bus.heard(wave.id);
             strays.push(stray);
         }
         let most = Span::from_ns(36);

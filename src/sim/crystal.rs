@@ -81,13 +81,9 @@ impl Crystal {
     /// What the crystal shows at `time`: the exact value rounded down.
     #[inline]
     pub fn to_local(&self, time: Time) -> Local {
-        // Of two numbers of 64 bits the product is exact in 128, and almost every reading needs no more.
-        let exact = time.ticks().checked_sub(self.since.ticks()).map(|span| wide(span, self.rate));
-        let ticks = exact.and_then(|exact| i64::try_from((exact + i128::from(self.fraction)) >> FRACTION).ok());
-        match ticks.and_then(|ticks| self.reading.ticks().checked_add(ticks)) {
-            Some(reading) => Local::from_ticks(reading),
-            None => self.far_to_local(time),
-        }
+        let Some(span) = near(time.ticks(), self.since.ticks()) else { return self.far_to_local(time) };
+        let ticks = (wide(span, self.rate) + i128::from(self.fraction)) >> FRACTION;
+        self.reading.ticks().checked_add(ticks as i64).map_or_else(|| self.far_to_local(time), Local::from_ticks)
     }
 
     /// The first instant at which the crystal shows `local` or more, so that a deadline never comes early.
@@ -95,20 +91,17 @@ impl Crystal {
     /// `to_local(to_true(l)) >= l` and `to_local(to_true(l) - 1 tick) < l` unless the result saturates.
     #[inline]
     pub fn to_true(&self, local: Local) -> Time {
-        // So near that the search needs no more than 64 bits for a span and 128 for a product.
-        const NEAR: i64 = 1 << 61;
-        let ticks = local.ticks().checked_sub(self.reading.ticks()).filter(|ticks| (-NEAR..NEAR).contains(ticks));
-        let Some(ticks) = ticks else { return self.far_to_true(local) };
-        let goal = (i128::from(ticks) << FRACTION) - i128::from(self.fraction);
-        // The inverse is less than 2^-62 too small and the fraction is below one tick, so the estimate is off by one
-        // or two ticks; the loops make it exact.
+        let Some(ticks) = near(local.ticks(), self.reading.ticks()) else { return self.far_to_true(local) };
+        // Half a tick is what the inverse, too small by less than 2^-62, makes of 2^61 ticks, one is what is rounded down,
+        // and a thousandth more than one is what the fraction is worth: the estimate is off by less than 1.51 ticks.
         let mut span = (wide(ticks, self.inverse) >> FRACTION) as i64;
-        let mut missing = goal - wide(span, self.rate);
-        while missing > 0 {
-            (span, missing) = (span + 1, missing - i128::from(self.rate));
+        // What it leaves of the way [2^-62 local tick] is therefore known by its lower 64 bits.
+        let mut left = (ticks << FRACTION).wrapping_sub(self.fraction).wrapping_sub(span.wrapping_mul(self.rate));
+        while left > 0 {
+            (span, left) = (span + 1, left - self.rate);
         }
-        while missing + i128::from(self.rate) <= 0 {
-            (span, missing) = (span - 1, missing + i128::from(self.rate));
+        if left <= -self.rate {
+            span -= 1;
         }
         self.since.ticks().checked_add(span).map_or_else(|| self.far_to_true(local), Time::from_ticks)
     }
@@ -155,6 +148,16 @@ fn rates(ppb: i64) -> Result<(i64, i64), CrystalError> {
     let rate = ((BILLION + i128::from(ppb)) << FRACTION) + BILLION / 2;
     let rate = rate / BILLION;
     Ok((rate as i64, ((1 << (2 * FRACTION)) / rate) as i64))
+}
+
+/// How far `to` is from `from`, if no farther than 2^61 ticks: the product with a rate then has at most 125 bits.
+#[inline]
+const fn near(to: i64, from: i64) -> Option<i64> {
+    const NEAR: i64 = 1 << 61;
+    match to.checked_sub(from) {
+        Some(ticks) if -NEAR <= ticks && ticks < NEAR => Some(ticks),
+        _ => None,
+    }
 }
 
 /// The product of two numbers, exact.
@@ -280,7 +283,7 @@ mod tests {
             let (since, reading) = (Time::from_ticks(since), Local::from_ticks(start));
             let all = Crystal { since, reading, fraction, ..crystal(ppb) };
             let long = Crystal { since: Time::from_ticks(near), reading: Local::from_ticks(-near), ..all.clone() };
-            for (crystal, ticks) in [(&all, far), (&all, start.saturating_add(near)), (&long, far), (&long, far >> 3)] {
+            for (crystal, ticks) in [(&all, far), (&all, start.saturating_add(near)), (&long, far), (&long, far >> 2), (&long, far >> 3)] {
                 let (time, local) = (Time::from_ticks(ticks), Local::from_ticks(ticks));
                 prop_assert_eq!(crystal.to_local(time), crystal.far_to_local(time));
                 prop_assert_eq!(crystal.to_true(local), crystal.far_to_true(local));

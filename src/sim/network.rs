@@ -4,16 +4,22 @@
 //! number on the line, a station's other events are numbered by this station alone. Only the order of numbers matters,
 //! and each random stream belongs to one station or one link, so that one more or less changes nothing for the others.
 
+// What every telegram and every deadline goes through is one function for the machine, written as several: a call for each
+// of them takes as long as what it does.
+#![allow(clippy::inline_always)]
+
 mod alarms;
+mod deadline;
 mod disturbed;
+mod listeners;
 mod source;
 mod tune;
 mod turn;
 
 use crate::fdl::params::BusParams;
-use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Station, Timer};
+use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Send, Station, Timer};
 use crate::observation::Observation;
-use crate::sim::bus::{Bus, Flight, FlightId, Mark};
+use crate::sim::bus::{Bus, FlightId, Mark, Wave};
 use crate::sim::crystal::Crystal;
 use crate::sim::cut::Cuts;
 use crate::sim::fault::Faults;
@@ -26,6 +32,7 @@ use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
 use crate::wire::{Address, Frame};
 use alarms::Alarms;
+use deadline::{Deadline, Turned};
 use disturbed::Held;
 use turn::Turning;
 
@@ -99,32 +106,27 @@ pub enum Until {
     Cycle(u64),
 }
 
-/// A deadline that is no alarm. Only one event of it counts at a time; arming it later than that event costs nothing until
-/// it comes.
-#[derive(Clone, Copy, Debug, Default)]
-struct Deadline {
-    /// Armed for this reading of the station's crystal, and the true time of it.
-    due: Option<(Local, Time)>,
-    /// Time of the event in the queue that counts.
-    queued: Option<Time>,
-}
-
-#[derive(Clone, Copy, Debug)]
+/// What happens to a station; the number of the event tells which.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Event {
-    Act(u32),
-    Telegram(FlightId),
-    /// A telegram for all reaches the station of this rank among the sender's neighbours; the next one is not yet told.
-    Broadcast(FlightId, u8),
+    /// An order of the scenario, by its place among them.
+    Act,
+    /// A telegram's end, by the telegram's place.
+    Telegram,
+    /// The same of a telegram for all; the next neighbour of the sender is not yet told.
+    Broadcast,
+    /// Its cycle begins.
     Sent,
-    Deadline(u8),
-    /// A telegram that a disturbance has held up, or made, leaves.
-    Held(u16),
-    /// A disturbance of this number among those that turn does so.
-    Turn(u16),
-    /// A disturbance of this number among those that turn changes rates of crystals.
-    Step(u16),
-    /// A disturbance of this number among those that turn puts something on the line.
-    Source(u16),
+    /// A deadline, by its number.
+    Deadline,
+    /// A telegram that a disturbance has held up, or made, leaves, by the telegram's place.
+    Held,
+    /// A disturbance turns, by its number among those that do.
+    Turn,
+    /// A disturbance changes rates of crystals, by its number among those that turn.
+    Step,
+    /// A disturbance puts something on the line, by its number among those that turn.
+    Source,
 }
 
 /// What a station's supply depends on.
@@ -169,8 +171,10 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     slots: Vec<Slot<S>>,
     /// Slot of each address.
     by_address: [Option<u8>; 128],
-    /// Slots that hear more than what is for them or for everybody.
-    curious: Vec<u8>,
+    /// Slots that hear everything.
+    attentive: Vec<u8>,
+    /// Slots that hear replies to all stations.
+    subscribers: Vec<u8>,
     /// For each slot all others, in the order in which a telegram reaches them.
     neighbours: Vec<Vec<u8>>,
     bus: Bus,
@@ -179,8 +183,8 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     jitter: JitterSource,
     faults: Faults,
     held: Held,
-    /// Room for what comes onto the line from nowhere.
-    foreign: Frame,
+    /// Room for what comes onto the line and is not as a sender has just written it.
+    altered: Frame,
     acts: Vec<(usize, Act<S::Command>)>,
     /// Which of them do not count any more.
     cancelled: core::ops::Range<usize>,
@@ -197,8 +201,17 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
 }
 
 /// An event of a network. Opaque: only queues handle it.
+///
+/// Its parts lie beside each other, not in the variants of an enum, so that each is written and read by itself.
 #[derive(Clone, Copy, Debug)]
-pub struct NetworkEvent(Event);
+pub struct NetworkEvent {
+    number: u32,
+    event: Event,
+    /// The station that it happens to.
+    slot: u8,
+    /// Of a telegram for all: the station's rank among the sender's neighbours.
+    rank: u8,
+}
 
 impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// The station whose cycles count.
@@ -233,7 +246,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 offset: Offset { own, pulled: 0, waits: false },
                 cycle_at: None,
                 sample_with_telegrams: false,
-                deadlines: [Deadline::default(); Outbox::DEADLINES],
+                deadlines: [Deadline::OFF; Outbox::DEADLINES],
                 number: 0,
             });
         }
@@ -243,14 +256,15 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             alarms: Alarms::new(slots.len()),
             slots,
             by_address,
-            curious: Vec::new(),
+            attentive: Vec::new(),
+            subscribers: Vec::new(),
             neighbours: Vec::new(),
             bus: wiring.bus(&places).with_t_syn(rate.span(BusParams::T_SYN)),
             queue: Q::default(),
             jitter,
             faults,
             held: Held::default(),
-            foreign: Frame::new(),
+            altered: Frame::new(),
             acts: Vec::new(),
             cancelled: 0..0,
             cycle_acts: Vec::new(),
@@ -277,7 +291,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.acts.push((slot.into(), act));
         let act = self.acts.len() - 1;
         match when {
-            When::Time(at) => self.push(at.max(self.now), Phase::Command, slot.into(), Event::Act(act as u32)),
+            When::Time(at) => self.push(at.max(self.now), Phase::Command, slot.into(), (Event::Act, act as u32)),
             When::Cycle(cycle) => {
                 let at = self.cycle_acts.partition_point(|&(other, _)| other <= cycle);
                 self.cycle_acts.insert(at, (cycle, act));
@@ -331,7 +345,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
 
     /// The next event. False when nothing will ever happen again.
     fn next<R: Recorder>(&mut self, recorder: &mut R) -> bool {
-        let (key, NetworkEvent(event)) = match self.queue.pop_before(self.alarms.next()) {
+        let (key, happening) = match self.queue.pop_before(self.alarms.next()) {
             Some(next) => next,
             None if self.alarm(recorder) => return true,
             None => match self.queue.pop() {
@@ -340,23 +354,39 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             },
         };
         self.now = key.time();
-        let slot = usize::from(self.by_address[usize::from(key.station())].expect("events belong to stations"));
-        match event {
-            Event::Act(act) if self.cancelled.contains(&(act as usize)) => {}
-            Event::Act(act) => self.act(act as usize, recorder),
-            Event::Telegram(id) => self.telegram(slot, id, recorder),
-            Event::Broadcast(id, rank) => {
-                self.tell_neighbour(id, rank + 1);
-                self.telegram(slot, id, recorder);
+        let NetworkEvent { number, event, slot, rank } = happening;
+        let slot = usize::from(slot);
+        let answered = match event {
+            Event::Telegram | Event::Broadcast => {
+                let id = FlightId::of(number);
+                if event == Event::Broadcast {
+                    self.tell_neighbour(id, rank + 1);
+                }
+                self.hear(slot, id)
             }
-            Event::Sent => self.sent(slot, recorder),
-            Event::Deadline(which) => self.deadline(slot, usize::from(which), recorder),
-            Event::Held(which) => self.release(slot, usize::from(which), recorder),
-            Event::Turn(number) => self.turn(number.into(), recorder),
-            Event::Step(number) => self.step_crystals(number.into()),
-            Event::Source(number) => self.emit(number.into(), recorder),
+            Event::Deadline => self.turn_deadline(slot, number as usize),
+            _ => self.happen(slot, (event, number as usize), recorder),
+        };
+        if let Some(now) = answered {
+            self.carry_out(slot, now, recorder);
         }
         true
+    }
+    /// What comes less often than telegrams and deadlines. The reading at which the station has answered, if that is to be
+    /// carried out.
+    #[inline(never)]
+    fn happen<R: Recorder>(&mut self, slot: usize, (event, number): (Event, usize), recorder: &mut R) -> Option<Local> {
+        match event {
+            Event::Sent => return self.sent(slot, recorder),
+            Event::Act if self.cancelled.contains(&number) => {}
+            Event::Act => self.act(number, recorder),
+            Event::Held => self.release(slot, number, recorder),
+            Event::Turn => self.turn(number, recorder),
+            Event::Step => self.step_crystals(number),
+            Event::Source => self.emit(number, recorder),
+            Event::Telegram | Event::Broadcast | Event::Deadline => unreachable!("these come often"),
+        }
+        None
     }
 
     /// The next event if it is an alarm. A station's other deadlines of the instant come before its alarms.
@@ -375,7 +405,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         self.now = at;
         self.alarms.disarm((slot, which));
-        self.due(slot, which, local, recorder);
+        let input = self.due(slot, which);
+        self.step(slot, local, input, recorder);
         true
     }
 
@@ -411,9 +442,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             return self.step(index, self.local(index), Input::PowerOn, recorder);
         }
         slot.cycle_at = None;
-        for deadline in &mut slot.deadlines {
-            deadline.due = None;
-        }
+        slot.deadlines.iter_mut().for_each(Deadline::disarm);
         self.alarms.disarm_all(index);
         if slot.offset.waits {
             self.tune(index);
@@ -423,6 +452,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.tell(index, &Observation::Power { on }, recorder);
     }
     /// Tells what happened to a station and was not its own doing.
+    #[inline(never)]
     fn tell<R: Recorder>(&self, slot: usize, what: &Observation, recorder: &mut R) {
         let Slot { address, site, .. } = &self.slots[slot];
         recorder.observe(Stamp { at: self.now, station: *address, crystal: &site.crystal }, what);
@@ -431,27 +461,27 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.slots[slot].site.crystal.to_local(self.now)
     }
 
-    fn telegram<R: Recorder>(&mut self, index: usize, id: FlightId, recorder: &mut R) {
+    /// A telegram's end reaches a station. Its reading if it has answered.
+    #[inline(always)]
+    fn hear(&mut self, index: usize, id: FlightId) -> Option<Local> {
         let sample = if self.slots[index].sample_with_telegrams { self.raw(index) } else { 0 };
-        let running = (self.now, self.clocks_begun(false));
-        let Self { slots, bus, faults, out, .. } = self;
+        let deaf = !self.faults.is_empty() && self.is_deaf(index);
+        let Self { slots, bus, out, now: instant, .. } = self;
         let slot = &mut slots[index];
-        let now = slot.site.crystal.to_local(running.0);
         let flight = bus.flight(id);
         // Without octets it was cut off before it began.
-        let comes = slot.powered && !flight.frame.is_empty() && bus.reaches(id, index);
-        let hears = comes && !faults.deafens(slot.address, running);
-        if hears {
+        let hears = slot.powered && !deaf && !flight.frame.is_empty() && bus.reaches(id, index);
+        let now = hears.then(|| slot.site.crystal.to_local(*instant));
+        if let Some(now) = now {
             out.clear();
             let octets = if flight.mark.broken { &[] } else { flight.frame.octets() };
             slot.site.machine.step(now, Input::Telegram(Heard { octets, sample }), out);
         }
         bus.heard(id);
-        if hears {
-            self.carry_out(index, now, recorder);
-        }
+        now
     }
     /// Whether a disturbance keeps a station from hearing.
+    #[cold]
     fn is_deaf(&self, slot: usize) -> bool {
         self.faults.deafens(self.slots[slot].address, (self.now, self.clocks_begun(false)))
     }
@@ -461,66 +491,74 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// A station's cycle begins. Only those of the first station are the network's.
-    fn sent<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
-        if self.slots[slot].cycle_at.take_if(|at| *at == self.now).is_none() {
-            return; // It lost its supply before.
-        }
+    fn sent<R: Recorder>(&mut self, slot: usize, recorder: &mut R) -> Option<Local> {
+        // Or it lost its supply before.
+        self.slots[slot].cycle_at.take_if(|at| *at == self.now)?;
         if self.slots[slot].offset.waits {
             self.tune(slot);
         }
-        if slot != Self::CLOCK {
-            return self.step(slot, self.local(slot), Input::Sent, recorder);
+        if slot == Self::CLOCK {
+            let cycle = self.clocks;
+            self.clocks += 1;
+            if cycle >= self.next_turn {
+                self.turn_in_cycle(cycle, recorder);
+            }
+            while let Some(&(_, act)) = self.cycle_acts.get(self.next_cycle_act).filter(|&&(due, _)| due <= cycle) {
+                self.next_cycle_act += 1;
+                self.act(act, recorder);
+            }
         }
-        let cycle = self.clocks;
-        self.clocks += 1;
-        if cycle >= self.next_turn {
-            self.turn_in_cycle(cycle, recorder);
-        }
-        while let Some(&(_, act)) = self.cycle_acts.get(self.next_cycle_act).filter(|&&(due, _)| due <= cycle) {
-            self.next_cycle_act += 1;
-            self.act(act, recorder);
-        }
-        self.step(slot, self.local(slot), Input::Sent, recorder);
+        self.ask(slot, self.local(slot), Input::Sent)
     }
 
-    fn deadline<R: Recorder>(&mut self, slot: usize, which: usize, recorder: &mut R) {
-        let now = self.now;
-        let deadline = &mut self.slots[slot].deadlines[which];
-        if deadline.queued != Some(now) {
-            return; // An earlier arming took its place.
+    /// An event of a deadline comes. The station's reading if it has answered.
+    #[inline(always)]
+    fn turn_deadline(&mut self, slot: usize, which: usize) -> Option<Local> {
+        match self.slots[slot].deadlines[which].turn(self.now) {
+            Turned::Due(local) => {
+                let input = self.due(slot, which);
+                self.ask(slot, local, input)
+            }
+            Turned::Early(at) => {
+                self.push(at, Phase::Deadline, slot, (Event::Deadline, which as u32));
+                None
+            }
+            Turned::Void => None,
         }
-        deadline.queued = None;
-        let Some((local, due)) = deadline.due else { return };
-        if due > now {
-            deadline.queued = Some(due);
-            return self.push(due, Phase::Deadline, slot, Event::Deadline(which as u8));
-        }
-        deadline.due = None;
-        self.due(slot, which, local, recorder);
     }
-    /// The deadline of this number that was armed for the reading `local` is due.
-    fn due<R: Recorder>(&mut self, slot: usize, which: usize, local: Local, recorder: &mut R) {
-        let input = match Timer::ALL.get(which) {
+    /// What the station learns when the deadline of this number is due.
+    #[inline(always)]
+    fn due(&self, slot: usize, which: usize) -> Input<'static, S::Command> {
+        match Timer::ALL.get(which) {
             Some(&timer) => Input::Deadline { timer, busy: timer == Timer::Slot && self.is_busy(slot) },
             None => Input::Sample(self.raw(slot)),
-        };
-        self.step(slot, local, input, recorder);
+        }
     }
 
     /// Whether a station sees characters on the line.
     fn is_busy(&self, slot: usize) -> bool {
-        self.bus.is_busy(self.now, slot) && !self.is_deaf(slot)
+        self.bus.is_busy(self.now, slot) && (self.faults.is_empty() || !self.is_deaf(slot))
     }
 
-    fn step<R: Recorder>(&mut self, slot: usize, now: Local, input: Input<'_, S::Command>, recorder: &mut R) {
-        if self.slots[slot].powered {
+    /// Lets a station answer into the outbox; without supply it does not. Returns `now` if it has.
+    #[inline(always)]
+    fn ask(&mut self, slot: usize, now: Local, input: Input<'_, S::Command>) -> Option<Local> {
+        let slot = &mut self.slots[slot];
+        slot.powered.then(|| {
             self.out.clear();
-            self.slots[slot].site.machine.step(now, input, &mut self.out);
+            slot.site.machine.step(now, input, &mut self.out);
+            now
+        })
+    }
+    /// The same, and what it answers is carried out.
+    fn step<R: Recorder>(&mut self, slot: usize, now: Local, input: Input<'_, S::Command>, recorder: &mut R) {
+        if let Some(now) = self.ask(slot, now, input) {
             self.carry_out(slot, now, recorder);
         }
     }
 
     /// Does what the station has put into the outbox.
+    #[inline(always)]
     fn carry_out<R: Recorder>(&mut self, index: usize, now: Local, recorder: &mut R) {
         let Self { out, slots, alarms, queue, now: instant, .. } = self;
         let slot = &mut slots[index];
@@ -531,15 +569,17 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             match (Alarms::has(which), order) {
                 (true, Order::At(at)) => alarms.arm((index, which), at.max(now), &slot.site.crystal, *instant),
                 (true, Order::Off) => alarms.disarm((index, which)),
-                (false, Order::At(at)) => Self::arm(queue, slot, which, at.max(now), *instant),
-                (false, Order::Off) => slot.deadlines[which].due = None,
+                (false, Order::At(at)) => Self::arm(queue, (index, slot), which, at.max(now), *instant),
+                (false, Order::Off) => slot.deadlines[which].disarm(),
             }
         }
         debug_assert!(out.has_filter_changed() || slot.filter == slot.site.machine.filter());
         if out.is_unusual() {
             self.carry_out_unusual(index);
         }
-        self.transmit(index, recorder);
+        if let Some((send, _)) = self.out.sending() {
+            self.transmit(index, send, recorder);
+        }
     }
     /// Does what the station seldom wants.
     #[cold]
@@ -563,132 +603,76 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// The station's cycle begins at `at`.
     fn begin_cycle(&mut self, slot: usize, at: Time) {
         self.slots[slot].cycle_at = Some(at);
-        self.push(at, Phase::Edge, slot, Event::Sent);
+        self.push(at, Phase::Edge, slot, (Event::Sent, 0));
     }
-    fn arm(queue: &mut Q, slot: &mut Slot<S>, which: usize, at: Local, now: Time) {
-        let due = slot.site.crystal.to_true(at).max(now);
-        let deadline = &mut slot.deadlines[which];
-        deadline.due = Some((at, due));
-        if deadline.queued.is_none_or(|queued| queued > due) {
-            deadline.queued = Some(due);
-            let key = Key::new(due, Phase::Deadline, slot.address.get(), slot.number);
+    /// Arms a deadline of the station `slot` at `index`.
+    #[inline(always)]
+    fn arm(queue: &mut Q, (index, slot): (usize, &mut Slot<S>), which: usize, reading: Local, now: Time) {
+        let at = slot.site.crystal.to_true(reading).max(now);
+        if slot.deadlines[which].arm(reading, at) {
+            let key = Key::new(at, Phase::Deadline, slot.address.get(), slot.number);
             slot.number += 1;
-            queue.push(key, NetworkEvent(Event::Deadline(which as u8)));
+            let (number, event) = (which as u32, Event::Deadline);
+            queue.push(key, NetworkEvent { number, event, slot: index as u8, rank: 0 });
         }
     }
-    fn push(&mut self, at: Time, phase: Phase, slot: usize, event: Event) {
-        let slot = &mut self.slots[slot];
-        self.queue.push(Key::new(at, phase, slot.address.get(), slot.number), NetworkEvent(event));
+    fn push(&mut self, at: Time, phase: Phase, index: usize, (event, number): (Event, u32)) {
+        let slot = &mut self.slots[index];
+        let key = Key::new(at, phase, slot.address.get(), slot.number);
         slot.number += 1;
+        self.queue.push(key, NetworkEvent { number, event, slot: index as u8, rank: 0 });
     }
 
-    /// Puts the telegram in the outbox, if there is one, onto the line.
-    fn transmit<R: Recorder>(&mut self, index: usize, recorder: &mut R) {
-        let Some((send, frame)) = self.out.sending() else { return };
+    /// Puts the telegram in the outbox onto the line.
+    #[inline(never)]
+    fn transmit<R: Recorder>(&mut self, index: usize, send: Send, recorder: &mut R) {
         let crystal = &self.slots[index].site.crystal;
-        let mut line = (crystal.to_true(send.at), crystal.to_true(send.at + self.rate.octets(frame.len())));
+        let length = self.rate.octets(self.out.frame().len());
+        let mut line = (crystal.to_true(send.at), crystal.to_true(send.at + length));
         if send.clock {
-            let jitter = self.jitter.draw(line.0, self.clocks) + self.faults.clock_strays(line.0, self.clocks);
-            let jitter = jitter.max(self.now - line.0);
-            line = (line.0 + jitter, line.1 + jitter);
-            // The master's transmitter runs, whatever becomes of the telegram.
-            self.begin_cycle(index, line.1);
+            line = self.send_clock(index, line);
         }
         if !self.faults.is_empty() {
-            return self.transmit_disturbed(index, line, send.clock, recorder);
+            match self.disturbed(index, line, send.clock, recorder) {
+                Some(left) => line = left,
+                None => return,
+            }
         }
-        let flight = self.bus.send(index, line, self.out.frame(), Mark::OWN);
-        self.sent_off(index, flight, recorder);
+        let on_line = self.bus.send(index, line, self.out.frame(), Mark::OWN);
+        self.sent_off(on_line, Mark::OWN, recorder);
+    }
+    /// The telegram in the outbox begins a cycle: when it is on the line.
+    #[inline(never)]
+    fn send_clock(&mut self, index: usize, (start, end): (Time, Time)) -> (Time, Time) {
+        let jitter = self.jitter.draw(start, self.clocks) + self.faults.clock_strays(start, self.clocks);
+        let jitter = jitter.max(self.now - start);
+        // The master's transmitter runs, whatever becomes of the telegram.
+        self.begin_cycle(index, end + jitter);
+        (start + jitter, end + jitter)
+    }
+    /// Puts the altered telegram onto the line.
+    #[inline(never)]
+    fn send_altered<R: Recorder>(&mut self, slot: usize, line: (Time, Time), mark: Mark, recorder: &mut R) {
+        let on_line = self.bus.send(slot, line, &self.altered, mark);
+        self.sent_off(on_line, mark, recorder);
     }
     /// Tells that a telegram is on the line, and its listeners when its end will reach them.
-    fn sent_off<R: Recorder>(&mut self, slot: usize, (id, hit): (FlightId, Option<usize>), recorder: &mut R) {
-        let sender = self.slots[slot].address;
-        let Flight { start, end, mark, ref frame, .. } = *self.bus.flight(id);
-        recorder.telegram(&Transmission { start, end, sender, octets: frame.octets(), origin: mark.origin });
+    #[inline(always)]
+    fn sent_off<R: Recorder>(&mut self, (wave, hit): (Wave, Option<u8>), mark: Mark, recorder: &mut R) {
+        let octets = self.bus.flight(wave.id).frame.octets();
+        let (route, sender) = (Route::of(octets), self.slots[wave.sender].address);
+        recorder.telegram(&Transmission { start: wave.start, end: wave.end, sender, octets, origin: mark.origin });
         if let Some(with) = hit {
-            self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
+            self.collided(wave.sender, usize::from(with), recorder);
         }
-        self.deliver(slot, id);
+        self.deliver(&wave, route, mark.apart);
+    }
+    #[cold]
+    fn collided<R: Recorder>(&mut self, slot: usize, with: usize, recorder: &mut R) {
+        self.tell(slot, &Observation::Collision { with: self.slots[with].address }, recorder);
     }
     /// The running cycle, or the one that the SYNCH being sent will begin.
     fn clocks_begun(&self, clock: bool) -> u64 {
         if clock { self.clocks } else { self.clocks.saturating_sub(1) }
-    }
-
-    /// Tells every listener when the telegram's end will reach it.
-    fn deliver(&mut self, sender: usize, id: FlightId) {
-        let route = Route::of(self.bus.flight(id).frame.octets());
-        if matches!(route, Some(Route { da: Route::TO_ALL, reply: false, .. })) {
-            return self.broadcast(sender, id);
-        }
-        let apart = self.bus.flight(id).mark.apart;
-        let mut listeners = 0;
-        for rank in 0..self.curious.len() {
-            let listener = usize::from(self.curious[rank]);
-            if (listener != sender || apart) && self.slots[listener].filter.passes(route) {
-                self.push_telegram(listener, id, Event::Telegram(id));
-                listeners += 1;
-            }
-        }
-        let addressed = route.and_then(|route| self.by_address[usize::from(route.da)]).map(usize::from);
-        if let Some(listener) = addressed.filter(|&slot| slot != sender || apart) {
-            let filter = &self.slots[listener].filter;
-            if !filter.is_curious() && filter.passes(route) {
-                self.push_telegram(listener, id, Event::Telegram(id));
-                listeners += 1;
-            }
-        }
-        self.bus.expect_listeners(id, listeners);
-    }
-    /// A request for all passes every filter. Only the nearest neighbour is told now and tells the next one when it has
-    /// heard, so that the queue holds one event of the telegram, not one for each station. Where links have jitter, who
-    /// is nearest differs from telegram to telegram, and all are told now; so where receivers have.
-    fn broadcast(&mut self, sender: usize, id: FlightId) {
-        let (count, apart) = (self.neighbours[sender].len(), self.bus.flight(id).mark.apart);
-        self.bus.expect_listeners(id, count as u16 + u16::from(apart));
-        if apart {
-            self.push_telegram(sender, id, Event::Telegram(id));
-        }
-        if count == 0 {
-            return;
-        }
-        if self.bus.delays().is_steady() && !self.faults.strays_arrivals() {
-            return self.tell_neighbour(id, 0);
-        }
-        for rank in 0..count {
-            let listener = self.neighbours[sender][rank].into();
-            self.push_telegram(listener, id, Event::Telegram(id));
-        }
-    }
-    fn tell_neighbour(&mut self, id: FlightId, rank: u8) {
-        if let Some(&listener) = self.neighbours[self.bus.flight(id).sender].get(usize::from(rank)) {
-            self.push_telegram(listener.into(), id, Event::Broadcast(id, rank));
-        }
-    }
-    /// The telegram's end reaches `listener`. Of telegrams that end there at one instant the one sent first comes first.
-    fn push_telegram(&mut self, listener: usize, id: FlightId, event: Event) {
-        let (mut at, number) = self.bus.arrival(id, listener);
-        if self.faults.strays_arrivals() {
-            let running = (self.bus.flight(id).start, self.clocks_begun(false));
-            at += self.faults.capture_stray(self.slots[listener].address, running);
-            // Nobody hears what has not been said.
-            at = at.max(self.bus.flight(id).end).max(self.now);
-        }
-        let key = Key::new(at, Phase::Telegram, self.slots[listener].address.get(), number);
-        self.queue.push(key, NetworkEvent(event));
-    }
-    /// All but `sender`, by delay and then by address, as events are ordered.
-    fn neighbours_of(&self, sender: usize) -> Vec<u8> {
-        let mut all: Vec<u8> = (0..self.slots.len() as u8).filter(|&slot| usize::from(slot) != sender).collect();
-        all.sort_by_key(|&slot| {
-            let slot = usize::from(slot);
-            (self.bus.delays().nominal(sender, slot), self.slots[slot].address)
-        });
-        all
-    }
-    fn sort_listeners(&mut self) {
-        self.curious.clear();
-        let curious = |(index, slot): (usize, &Slot<S>)| slot.filter.is_curious().then_some(index as u8);
-        self.curious.extend(self.slots.iter().enumerate().filter_map(curious));
     }
 }

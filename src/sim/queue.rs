@@ -180,16 +180,18 @@ impl<E: Copy> Queue<E> for HeapQueue<E> {
 /// Today's events are sorted. Most events of a bus cycle come next as soon as they are pushed (a request, its answer, its
 /// echo): they end the list of today and leave it at once. Events of another day of the coming year are noted on the
 /// page of that day, in no order, and sorted when the day has come. The few that are later still wait in a heap.
+///
+/// As long as few events wait, as in a network of one or two slaves, pages are not worth it: today does not end.
 #[derive(Clone, Debug)]
 pub struct NearQueue<E> {
     /// Events of `date` and of days before it, descending: the next one is the last.
     today: Vec<(Key, E)>,
-    /// Day up to which `today` has everything.
+    /// Day up to which `today` has everything; the end of all days as long as few events have waited at once.
     date: i64,
     /// Pages of the coming year: for each day, modulo the year, its first note.
     pages: Vec<Option<NoteId>>,
     /// The pages that have notes, as bits.
-    marked: [u64; YEAR / 64],
+    marked: u128,
     notes: Vec<Note<E>>,
     /// First of the notes that can be written over.
     blank: Option<NoteId>,
@@ -203,7 +205,9 @@ pub struct NearQueue<E> {
 /// Bits of a tick's number within its day: a day is 0.35 ms.
 const DAY_BITS: u32 = 22;
 /// Days in a year: 45 ms, more than the longest T_DP.
-const YEAR: usize = 128;
+const YEAR: usize = u128::BITS as usize;
+/// So many events are kept in order faster than noted.
+const FEW: usize = 12;
 
 /// An event on a page.
 #[derive(Clone, Copy, Debug)]
@@ -229,9 +233,9 @@ impl<E: Copy> Default for NearQueue<E> {
     fn default() -> Self {
         Self {
             today: Vec::with_capacity(ROOM),
-            date: 0,
+            date: i64::MAX,
             pages: vec![None; YEAR],
-            marked: [0; YEAR / 64],
+            marked: 0,
             notes: Vec::with_capacity(ROOM),
             blank: None,
             noted: 0,
@@ -244,17 +248,54 @@ impl<E: Copy> NearQueue<E> {
     /// Steps from the next event before the search halves.
     const STEPS: usize = 8;
 
-    /// Puts an event at its place in the list of today: nearly always it is the next one.
-    #[inline]
-    fn insert(&mut self, key: Key, event: E) {
-        if self.today.last().is_some_and(|&(next, _)| next < key) {
-            self.insert_later(key, event);
+    /// Puts an event that is not the next of all at its place.
+    #[inline(never)]
+    fn put(&mut self, key: Key, event: E) {
+        if self.date < i64::MAX {
+            self.put_by_day(key, event);
         } else {
-            self.today.push((key, event));
+            self.put_among_few(key, event);
         }
     }
+    /// The same while today does not end.
     #[inline(never)]
-    fn insert_later(&mut self, key: Key, event: E) {
+    fn put_among_few(&mut self, key: Key, event: E) {
+        if self.today.len() >= FEW {
+            self.spread_out();
+            return self.put_by_day(key, event);
+        }
+        self.today.push((key, event));
+        let mut place = self.today.len() - 1;
+        while place > 0 && self.today[place - 1].0 < key {
+            self.today[place] = self.today[place - 1];
+            place -= 1;
+        }
+        self.today[place] = (key, event);
+    }
+    /// The same once there are days.
+    #[inline(never)]
+    fn put_by_day(&mut self, key: Key, event: E) {
+        let day = day(key);
+        if day <= self.date {
+            self.insert(key, event);
+        } else if day - self.date < YEAR as i64 {
+            self.note(key, event);
+        } else {
+            self.later.push(Waiting { key, event });
+        }
+    }
+    /// From now on there are days and pages.
+    #[cold]
+    fn spread_out(&mut self) {
+        self.date = self.today.last().map_or(0, |&(next, _)| day(next));
+        let later = self.today.partition_point(|&(key, _)| day(key) > self.date);
+        for place in 0..later {
+            let (key, event) = self.today[place];
+            self.put_by_day(key, event);
+        }
+        self.today.drain(..later);
+    }
+    fn insert(&mut self, key: Key, event: E) {
         let len = self.today.len();
         let mut place = len;
         while place > 0 && self.today[place - 1].0 < key {
@@ -281,24 +322,18 @@ impl<E: Copy> NearQueue<E> {
             NoteId::new(self.notes.len() as u32).expect("not zero after a push")
         };
         self.pages[page] = Some(id);
-        self.marked[page / 64] |= 1 << (page % 64);
+        self.marked |= 1 << page;
         self.noted += 1;
     }
 
     /// The next day with a note.
     fn next_noted(&self) -> Option<i64> {
-        if self.noted == 0 {
+        if self.marked == 0 {
             return None;
         }
-        let first = page(self.date + 1);
-        // All words from that of the first page on, and its own again for the pages before it.
-        let ahead = (0..=self.marked.len()).find_map(|step| {
-            let word = (first / 64 + step) % self.marked.len();
-            let from = if step == 0 { u64::MAX << (first % 64) } else { u64::MAX };
-            let bits = self.marked[word] & from;
-            (bits != 0).then(|| (word * 64 + bits.trailing_zeros() as usize + YEAR - first) % YEAR)
-        })?;
-        Some(self.date + 1 + ahead as i64)
+        let tomorrow = self.date + 1;
+        let ahead = self.marked.rotate_right(page(tomorrow) as u32).trailing_zeros();
+        Some(tomorrow + i64::from(ahead))
     }
 
     /// The list of today is empty: goes on to the next day that has something. Not before the next event is asked for,
@@ -319,7 +354,7 @@ impl<E: Copy> NearQueue<E> {
     }
     fn take_page(&mut self, page: usize) {
         let mut next = self.pages[page].take();
-        self.marked[page / 64] &= !(1 << (page % 64));
+        self.marked &= !(1 << page);
         while let Some(id) = next {
             let note = &mut self.notes[id.get() as usize - 1];
             self.today.push((note.key, note.event));
@@ -330,14 +365,12 @@ impl<E: Copy> NearQueue<E> {
     }
 }
 impl<E: Copy> Queue<E> for NearQueue<E> {
+    #[inline]
     fn push(&mut self, key: Key, event: E) {
-        let day = day(key);
-        if day <= self.date {
-            self.insert(key, event);
-        } else if day - self.date < YEAR as i64 {
-            self.note(key, event);
+        if day(key) <= self.date && self.today.last().is_none_or(|&(next, _)| key < next) {
+            self.today.push((key, event));
         } else {
-            self.later.push(Waiting { key, event });
+            self.put(key, event);
         }
     }
     fn pop(&mut self) -> Option<(Key, E)> {

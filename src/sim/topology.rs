@@ -195,8 +195,8 @@ impl Delays {
         }
         delays
     }
-    const fn pair(a: usize, b: usize) -> usize {
-        if a < b { a * Self::ROW + b } else { b * Self::ROW + a }
+    fn pair(a: usize, b: usize) -> usize {
+        a.min(b) * Self::ROW + a.max(b)
     }
     /// Whether every telegram takes the same time.
     pub const fn is_steady(&self) -> bool {

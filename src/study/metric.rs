@@ -158,6 +158,7 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
     }
 
     /// Sends the held events off: their instant is over.
+    #[cold]
     fn release(&mut self) {
         let cycle = self.open.map_or(0, |open| open.cycle);
         for mut event in self.held.drain(..) {
@@ -192,6 +193,19 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
         }
     }
 
+    /// Takes what may have to be counted; `slave` is the number of the station if it is a slave.
+    #[inline(never)]
+    fn count(&mut self, slave: Option<usize>, stamp: &Stamp<'_>, what: &Observation) {
+        self.counts.station(stamp.at, stamp.station, what);
+        if stamp.station == self.layout.master {
+            self.master(stamp, what);
+        } else if let Some(index) = slave {
+            self.slave(index, stamp, what);
+        }
+        if what.is_event() {
+            self.held.push(EventRow { at: stamp.at, cycle: 0, station: stamp.station, what: *what });
+        }
+    }
     /// What the master observed.
     fn master(&mut self, stamp: &Stamp<'_>, what: &Observation) {
         self.counts.master(what, &self.layout);
@@ -228,16 +242,32 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
         }
         self.slaves[index].observe(what);
     }
-    /// The same, as far as rows go.
-    fn routine(&mut self, index: usize, stamp: &Stamp<'_>, what: &Observation) {
-        if let Observation::Latch { locked: true, .. } = what {
-            self.latch(index, stamp.at);
+    /// Takes what a slave observes in every cycle in which all is well: it is in the rows and in no count. Whether it was
+    /// that.
+    #[allow(clippy::inline_always)] // See `observe`.
+    #[inline(always)]
+    fn routine(&mut self, index: usize, at: Time, what: &Observation) -> bool {
+        let slave = &mut self.slaves[index];
+        match *what {
+            Observation::Clock { verdict: ClockVerdict::Hit, error, period, window, counter } => {
+                slave.row.pll_error = Some(error);
+                slave.clocked(period, window, counter);
+            }
+            Observation::SetPoint { mls, sls, counter, expected: true } => slave.compared(mls, sls, counter),
+            Observation::Latch { locked, inputs } => {
+                (slave.row.g1_zsw, slave.row.xist1, slave.row.xist2) = (inputs.g1_zsw, inputs.xist1, inputs.xist2);
+                if locked {
+                    self.latch(index, at);
+                }
+            }
+            _ => return false,
         }
-        self.slaves[index].observe(what);
+        true
     }
 
     /// A locked latch. The first one of a cycle counts for the offset; a second one is possible only where the next
     /// SYNCH is later than T_I.
+    #[inline]
     fn latch(&mut self, index: usize, at: Time) {
         let slave = &mut self.slaves[index];
         slave.latched = Some(at);
@@ -279,34 +309,18 @@ impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
         }
     }
 
+    // Most observations are routine, and a call takes as long as to note one of these.
+    #[allow(clippy::inline_always)]
+    #[inline(always)]
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         if self.held.first().is_some_and(|event| event.at < stamp.at) {
             self.release();
         }
         let slave = self.layout.slave(stamp.station);
-        if let (Some(index), true) = (slave, is_routine(what)) {
-            return self.routine(index, &stamp, what);
-        }
-        self.counts.station(stamp.at, stamp.station, what);
-        if stamp.station == self.layout.master {
-            self.master(&stamp, what);
-        } else if let Some(index) = slave {
-            self.slave(index, &stamp, what);
-        }
-        if what.is_event() {
-            self.held.push(EventRow { at: stamp.at, cycle: 0, station: stamp.station, what: *what });
+        if !slave.is_some_and(|index| self.routine(index, stamp.at, what)) {
+            self.count(slave, &stamp, what);
         }
     }
-}
-
-/// Whether this is what a slave observes in every cycle in which all is well: it is in the rows and in no count.
-const fn is_routine(what: &Observation) -> bool {
-    matches!(
-        what,
-        Observation::Clock { verdict: ClockVerdict::Hit, .. }
-            | Observation::SetPoint { expected: true, .. }
-            | Observation::Latch { .. }
-    )
 }
 
 /// Largest minus smallest latch offset over the locked encoders, as time and in counts (Model: D9).
@@ -348,6 +362,14 @@ impl Watch {
         Self { row, encoder: slave.encoder, grid, offset_counts: 0.0, latched: None, travelling: None, reply: None }
     }
 
+    /// The clock recovery took a SYNCH, or noticed that one is missing.
+    fn clocked(&mut self, period: Span, window: Span, counter: u16) {
+        (self.row.period, self.row.window, self.row.clock_counter) = (Some(period), Some(window), counter);
+    }
+    /// The signs of life were compared at T_O.
+    fn compared(&mut self, mls: u8, sls: u8, counter: u16) {
+        (self.row.mls, self.row.sls, self.row.life_counter) = (mls, sls, counter);
+    }
     fn next_cycle(&mut self) {
         (self.row.pll_error, self.row.latch_offset, self.offset_counts) = (None, None, 0.0);
         (self.travelling, self.latched, self.reply) = (self.latched, None, None);
@@ -362,6 +384,7 @@ impl Watch {
         (row.life_counter, row.clock_counter) = (0, 0);
     }
 
+    /// Takes what does not come in every cycle.
     fn observe(&mut self, what: &Observation) {
         let row = &mut self.row;
         match *what {
@@ -386,17 +409,12 @@ impl Watch {
             Observation::Power { on: false } => self.switched_off(),
             Observation::Clock { verdict: ClockVerdict::Stray, .. } => {}
             Observation::Clock { verdict, error, period, window, counter } => {
-                if matches!(verdict, ClockVerdict::Hit | ClockVerdict::Outside) {
+                if verdict == ClockVerdict::Outside {
                     row.pll_error = Some(error);
                 }
-                (row.period, row.window, row.clock_counter) = (Some(period), Some(window), counter);
+                self.clocked(period, window, counter);
             }
-            Observation::Latch { inputs, .. } => {
-                (row.g1_zsw, row.xist1, row.xist2) = (inputs.g1_zsw, inputs.xist1, inputs.xist2);
-            }
-            Observation::SetPoint { mls, sls, counter, .. } => {
-                (row.mls, row.sls, row.life_counter) = (mls, sls, counter);
-            }
+            Observation::SetPoint { mls, sls, counter, .. } => self.compared(mls, sls, counter),
             _ => {}
         }
     }
@@ -489,13 +507,15 @@ mod tests {
         let clock = |verdict| Observation::Clock { verdict, error: Span::ZERO, period, window: period, counter: 3 };
         let set_point = |expected| Observation::SetPoint { mls: 1, sls: 2, counter: 3, expected };
         let latch = |locked| Observation::Latch { locked, inputs };
+        let mut metrics = Told::new(0).metrics;
         for what in [clock(ClockVerdict::Hit), set_point(true), latch(true), latch(false)] {
-            assert!(is_routine(&what) && !what.is_event());
+            assert!(metrics.routine(0, at(7), &what) && !what.is_event());
             counts.station(at(7), address(3), &what);
             counts.slaves[0].observe(at(7), 9, &what);
         }
         assert_eq!(counts, before);
-        assert!(!is_routine(&clock(ClockVerdict::Outside)) && !is_routine(&set_point(false)));
+        assert!(!metrics.routine(0, at(7), &clock(ClockVerdict::Outside)));
+        assert!(!metrics.routine(0, at(7), &set_point(false)));
     }
 
     #[test]

@@ -108,16 +108,18 @@ impl Alarms {
 
     /// Looks at all that may come by `limit`. If [`next`](Self::next) is not later than that now, one comes then.
     pub(super) fn look<'a>(&mut self, limit: Time, now: Time, crystal: impl Fn(usize) -> &'a Crystal) {
-        self.next = Time::MAX;
-        for (which, next) in self.nexts.iter_mut().enumerate() {
+        let Self { all, users, nexts, .. } = self;
+        let mut first = Time::MAX;
+        for (which, (next, users)) in nexts.iter_mut().zip(users).enumerate() {
             if *next <= limit {
-                *next = self.users[which].iter().fold(Time::MAX, |next, &slot| {
+                *next = users.iter().fold(Time::MAX, |next, &slot| {
                     let slot = usize::from(slot);
-                    self.all[slot][which].look(crystal(slot), now).min(next)
+                    all[slot][which].look(crystal(slot), now).min(next)
                 });
             }
-            self.next = self.next.min(*next);
+            first = first.min(*next);
         }
+        self.next = first;
     }
     /// Which one comes first: slot, number and reading. Of several at one instant the one with the least `rank`, then the
     /// one with the least number.

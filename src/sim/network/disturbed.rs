@@ -44,26 +44,27 @@ impl Held {
 }
 
 impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
-    /// Puts the telegram in the outbox onto the line, or what disturbances leave of it.
+    /// What disturbances make of the telegram in the outbox. When it is on the line if it is to be sent as it is; otherwise
+    /// it is on its way already, or lost.
     #[cold]
-    pub(super) fn transmit_disturbed<R: Recorder>(
+    pub(super) fn disturbed<R: Recorder>(
         &mut self,
         slot: usize,
         (start, end): (Time, Time),
         clock: bool,
         recorder: &mut R,
-    ) {
+    ) -> Option<(Time, Time)> {
         let delay = if clock { Span::ZERO } else { self.answer_delay(slot, start) };
         let (start, end) = (start + delay, end + delay);
         let cycle = self.clocks_begun(clock);
+        let sender = self.slots[slot].address;
         if self.faults.line.is_idle() {
-            return self.transmit_whole(slot, (start, end), cycle, recorder);
+            return (!self.faults.mutes(sender, (start, cycle))).then_some((start, end));
         }
-        let Some((_, frame)) = self.out.sending() else { return };
-        let sent = Sent { sender: self.slots[slot].address, clock, octets: frame.octets() };
-        self.faults.line.judge((start, cycle), &sent);
-        if self.faults.mutes(sent.sender, (start, cycle)) {
-            return;
+        let (_, frame) = self.out.sending()?;
+        self.faults.line.judge((start, cycle), &Sent { sender, clock, octets: frame.octets() });
+        if self.faults.mutes(sender, (start, cycle)) {
+            return None;
         }
         let (mut lost, mut late) = (false, Span::ZERO);
         for index in 0..self.faults.line.strikes().len() {
@@ -77,29 +78,24 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
         }
         if lost {
-            return;
+            return None;
         }
         let length = end - start;
         self.copy_telegrams(slot, (end + late, length));
         let (frame, broken) = self.faults.line.telegram();
         if late > Span::ZERO {
             let place = self.held.keep(frame, broken, Origin::Sender, length);
-            return self.push(start + late, Phase::Send, slot, Event::Held(place));
+            self.push(start + late, Phase::Send, slot, (Event::Held, place.into()));
+        } else {
+            self.altered.copy_from(frame);
+            self.send_altered(slot, (start, end), Mark { broken, ..Mark::OWN }, recorder);
         }
-        let flight = self.bus.send(slot, (start, end), frame, Mark { broken, ..Mark::OWN });
-        self.sent_off(slot, flight, recorder);
+        None
     }
     /// How much later than usual a station answers.
     fn answer_delay(&mut self, slot: usize, start: Time) -> Span {
         let running = (start, self.clocks_begun(false));
         self.faults.answer_delay(self.slots[slot].address, running)
-    }
-    /// Puts the telegram in the outbox onto the line as it is, unless something keeps its sender from it.
-    fn transmit_whole<R: Recorder>(&mut self, slot: usize, line: (Time, Time), cycle: u64, recorder: &mut R) {
-        if !self.faults.mutes(self.slots[slot].address, (line.0, cycle)) {
-            let flight = self.bus.send(slot, line, self.out.frame(), Mark::OWN);
-            self.sent_off(slot, flight, recorder);
-        }
     }
     /// Keeps the copies of a telegram of this length that ends at `end`, as its sender has sent it.
     fn copy_telegrams(&mut self, slot: usize, (end, length): (Time, Span)) {
@@ -107,7 +103,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let strike = self.faults.line.strikes()[index];
             if let (Struck::Twice(after), Some((_, frame))) = (strike.what, self.out.sending()) {
                 let place = self.held.keep(frame, false, Origin::Disturbance(strike.number), length);
-                self.push(end + after, Phase::Send, slot, Event::Held(place));
+                self.push(end + after, Phase::Send, slot, (Event::Held, place.into()));
             }
         }
     }
@@ -115,14 +111,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     pub(super) fn release<R: Recorder>(&mut self, slot: usize, place: usize, recorder: &mut R) {
         self.held.free.push(place as u16);
         let running = (self.now, self.clocks_begun(false));
-        let Self { held, bus, slots, now, faults, .. } = self;
+        let Self { held, altered, slots, now, faults, .. } = self;
         let Waiting { frame, broken, origin, length } = &held.telegrams[place];
         let sends = slots[slot].powered && !faults.mutes(slots[slot].address, running);
         if *origin == Origin::Sender && !sends {
             return;
         }
-        let flight =
-            bus.send(slot, (*now, *now + *length), frame, Mark { origin: *origin, broken: *broken, apart: false });
-        self.sent_off(slot, flight, recorder);
+        altered.copy_from(frame);
+        let (line, mark) = ((*now, *now + *length), Mark { origin: *origin, broken: *broken, apart: false });
+        self.send_altered(slot, line, mark, recorder);
     }
 }

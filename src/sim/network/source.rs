@@ -18,7 +18,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         source.planned = source.goes_on();
         let (at, slot) = (self.now + source.fault.after + source.pause(), slots[0]);
-        self.push(at, Phase::Send, slot, Event::Source(index as u16));
+        self.push(at, Phase::Send, slot, (Event::Source, index as u32));
     }
     /// What a source has planned comes now. Noise that goes on stops outside of a burst until the next one begins.
     #[cold]
@@ -35,19 +35,18 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             }
         }
         let (number, now, slot) = (*number, self.now, slots[0]);
-        let broken = source.fill(&mut self.foreign);
+        let broken = source.fill(&mut self.altered);
         let again = source.planned.then(|| source.pause());
         let how = match source.fault.what {
             Emission::Noise { .. } => Disturbance::Noise,
             Emission::Telegram(_) => Disturbance::Foreign,
         };
-        let end = now + self.rate.octets(self.foreign.len());
+        let end = now + self.rate.octets(self.altered.len());
         let mark = Mark { origin: Origin::Disturbance(number), broken, apart: true };
-        let flight = self.bus.send(slot, (now, end), &self.foreign, mark);
         self.tell(slot, &Observation::Disturbed { number, how }, recorder);
-        self.sent_off(slot, flight, recorder);
+        self.send_altered(slot, (now, end), mark, recorder);
         if let Some(again) = again {
-            self.push(now + again, Phase::Send, slot, Event::Source(index as u16));
+            self.push(now + again, Phase::Send, slot, (Event::Source, index as u32));
         }
     }
 }

@@ -44,7 +44,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         tuning.planned = true;
         let slot = slots[0];
-        self.push(self.now + interval, Phase::Command, slot, Event::Step(index as u16));
+        self.push(self.now + interval, Phase::Command, slot, (Event::Step, index as u32));
     }
     /// Changes what a disturbance makes of its crystals, and their rates with it.
     fn pull(&mut self, index: usize, change: impl Fn(&mut Pull)) {
@@ -78,8 +78,8 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             .expect("a rate within bounds");
         self.alarms.retune(index, &slot.site.crystal, self.now);
         for which in 0..Outbox::DEADLINES {
-            if let Some((local, _)) = self.slots[index].deadlines[which].due {
-                Self::arm(&mut self.queue, &mut self.slots[index], which, local, self.now);
+            if let Some(reading) = self.slots[index].deadlines[which].armed() {
+                Self::arm(&mut self.queue, (index, &mut self.slots[index]), which, reading, self.now);
             }
         }
     }

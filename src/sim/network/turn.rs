@@ -104,7 +104,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         *retired = true;
         if turns.is_on() {
             let slot = slots[0];
-            self.push(self.now, Phase::Command, slot, Event::Turn(index as u16));
+            self.push(self.now, Phase::Command, slot, (Event::Turn, index as u32));
         }
     }
     fn slot_of(&self, station: Address) -> Option<usize> {
@@ -136,7 +136,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Some(Turn::Cycle(cycle)) => self.next_turn = self.next_turn.min(cycle as u64),
             Some(Turn::Time(at)) => {
                 let at = Time::from_ticks(at).max(self.now);
-                self.push(at, Phase::Command, slot, Event::Turn(index as u16));
+                self.push(at, Phase::Command, slot, (Event::Turn, index as u32));
             }
         }
     }
