@@ -175,7 +175,6 @@ pub struct Master<A> {
     /// Last bit of the last Data_Exchange answer, or t0.
     exchange_end: Local,
     exchanged: bool,
-    retries: u32,
     /// The mode has to be told to the slaves.
     control_due: bool,
     /// Cycle in which it was told last, and after how many it is told again.
@@ -210,7 +209,6 @@ impl<A: Application> Master<A> {
             t0: Local::ZERO,
             exchange_end: Local::ZERO,
             exchanged: false,
-            retries: 0,
             control_due: true,
             control_told: 0,
             // Never in every cycle: slaves start up in the acyclic part too.
@@ -333,7 +331,7 @@ impl<A: Application> Master<A> {
         self.t0 = now;
         self.exchange_end = now;
         self.exchanged = false;
-        self.retries = 0;
+        self.active.count_anew();
         self.overload.cycle_begins();
         out.observe(Observation::CycleStart { cycle, nominal });
         let (mode, to_blame) = self.supervision.cycle(now, cycle - self.begun, self.mode, &self.handlers);
@@ -403,7 +401,8 @@ impl<A: Application> Master<A> {
     }
     fn exchange_done(&mut self, out: &mut Outbox) {
         if self.exchanged {
-            out.observe(Observation::ExchangeDone { t_dx: self.exchange_end - self.t0, retries: self.retries });
+            let retries = self.active.repeats();
+            out.observe(Observation::ExchangeDone { t_dx: self.exchange_end - self.t0, retries });
         }
         self.acyclic(self.exchange_end, out);
     }
@@ -567,40 +566,46 @@ impl<A: Application> Station for Master<A> {
     }
     fn step(&mut self, now: Local, input: Input<'_, Self::Command>, out: &mut Outbox) {
         match input {
+            Input::Command(order) => self.order(order, out),
+            input => self.take(now, input, out),
+        }
+    }
+}
+
+impl<A: Application> Master<A> {
+    /// As [`Station::step`], but for orders: those are ignored here and taken by [`order`](Self::order).
+    #[inline(never)]
+    pub fn take<C: Copy>(&mut self, now: Local, input: Input<'_, C>, out: &mut Outbox) {
+        match input {
             Input::PowerOn => self.power_on(now, out),
             Input::Telegram(heard) => {
                 let confirm = self.active.heard(now, heard, out);
-                self.count_retry(out);
                 self.confirmed(now, confirm, out);
             }
             Input::Sent if self.part == Part::Clock => self.clock_sent(now, out),
             Input::Sent if self.bereft => self.cycle_begins(now, out),
             Input::Deadline { timer: Timer::Slot, busy } => {
                 let confirm = self.active.slot_over(now, busy, out);
-                self.count_retry(out);
                 self.confirmed(now, confirm, out);
             }
             Input::Deadline { timer: Timer::Schedule, .. } => self.scheduled(now, out),
-            Input::Command(Order::Mode(mode)) if self.mode >= MasterMode::Clear => {
+            Input::Sent | Input::Deadline { .. } | Input::Sample(_) | Input::Command(_) => {}
+        }
+    }
+    /// Takes an order.
+    #[cold]
+    pub fn order(&mut self, order: Order<A::Command>, out: &mut Outbox) {
+        match order {
+            Order::Mode(mode) if self.mode >= MasterMode::Clear => {
                 self.supervision.ordered();
                 self.set_mode(mode, out);
             }
-            Input::Command(Order::Control(control)) if self.mode >= MasterMode::Clear => self.commands.push(control),
-            Input::Sent
-            | Input::Deadline { .. }
-            | Input::Sample(_)
-            | Input::Command(Order::Mode(_) | Order::Control(_)) => {}
-            Input::Command(Order::Patch(slave, telegram, patch)) => self.patch(slave, telegram, &patch, out),
-            Input::Command(Order::HoldToken(order)) => self.active.hold_token(order),
-            Input::Command(Order::Overlong(order)) => self.overload(order),
-            Input::Command(Order::Application(command)) => self.app.command(command, out),
+            Order::Control(control) if self.mode >= MasterMode::Clear => self.commands.push(control),
+            Order::Mode(_) | Order::Control(_) => {}
+            Order::Patch(slave, telegram, patch) => self.patch(slave, telegram, &patch, out),
+            Order::HoldToken(order) => self.active.hold_token(order),
+            Order::Overlong(order) => self.overload(order),
+            Order::Application(command) => self.app.command(command, out),
         }
-    }
-}
-
-impl<A: Application> Master<A> {
-    /// The active station repeats on its own and says so in this step's observations.
-    fn count_retry(&mut self, out: &Outbox) {
-        self.retries += u32::from(out.observations().any(|seen| matches!(seen, Observation::Retry { .. })));
     }
 }

@@ -148,6 +148,7 @@ pub struct Active {
     asked_until: Local,
     /// How much longer than it has to the station keeps each token.
     hold: Span,
+    repeats: u32,
 }
 
 /// An order of the scenario: from now on the station keeps each token so much longer before it passes it on, as a slow
@@ -174,6 +175,7 @@ impl Active {
             doubted: None,
             asked_until: Local::ZERO,
             hold: Span::ZERO,
+            repeats: 0,
         }
     }
     /// Keeps tokens longer from now on.
@@ -207,6 +209,14 @@ impl Active {
         let rate = self.bus.rate;
         let answered = rate.span(self.bus.max_tsdr) + rate.octets(reply);
         rate.octets(octets) + answered.max(self.t_sl)
+    }
+    /// How many requests were repeated since [`count_anew`](Self::count_anew).
+    pub const fn repeats(&self) -> u32 {
+        self.repeats
+    }
+    /// From now on repeats are counted from zero.
+    pub const fn count_anew(&mut self) {
+        self.repeats = 0;
     }
     /// What this station knows of the ring.
     pub const fn ring(&self) -> &Ring {
@@ -423,6 +433,7 @@ impl Active {
         self.goes_on(now, out);
         if awaited.retries_left > 0 {
             out.observe(Observation::Retry { slave: awaited.from });
+            self.repeats += 1;
             self.send_last(self.free_at, out);
             self.state = State::AwaitDataResponse(Awaited {
                 retries_left: awaited.retries_left - 1,

@@ -87,6 +87,7 @@ impl Passive {
     }
 
     /// Takes a telegram whose last bit arrived at `now`.
+    #[inline]
     pub fn heard<'a>(&mut self, now: Local, heard: Heard<'a>, out: &mut Outbox) -> Indication<'a> {
         // A broken telegram is dropped without a word (EN 50170-2).
         let Ok(Telegram::Data { header, du }) = Telegram::parse(heard.octets) else { return Indication::Nothing };
@@ -104,8 +105,7 @@ impl Passive {
             }
             FrameControl::Request { service, fcb } if service.expects_reply() => {
                 if self.is_repeated(header.sa, fcb) {
-                    let reply = &self.memory.reply;
-                    out.send(now + self.rate.span(self.t_sdr()), |frame| frame.copy_from(reply));
+                    self.reply_again(now, out);
                     return Indication::Nothing;
                 }
                 self.pending = Some(header);
@@ -115,6 +115,7 @@ impl Passive {
         }
     }
 
+    #[inline]
     fn is_repeated(&mut self, master: Address, fcb: Fcb) -> bool {
         let memory = &mut self.memory;
         let (known, bit) = match fcb {
@@ -134,6 +135,11 @@ impl Passive {
         false
     }
 
+    #[cold]
+    fn reply_again(&self, now: Local, out: &mut Outbox) {
+        out.send(now + self.rate.span(self.t_sdr()), |frame| frame.copy_from(&self.memory.reply));
+    }
+    #[cold]
     fn answer_status(&self, now: Local, request: &Header, out: &mut Outbox) {
         let fc = FrameControl::Response { station: StationType::Slave, status: Status::Ok };
         let header = Header { da: request.sa, sa: self.address, dsap: None, ssap: None, fc };

@@ -2,6 +2,7 @@
 
 use super::header::{Address, FrameControl, Header, Sap};
 use core::fmt;
+use core::ops::Range;
 
 /// Octets of the longest frame: SD2 with LE = 249. EN 50170-2.
 pub const MAX_FRAME: usize = 255;
@@ -29,6 +30,8 @@ const SD1_LEN: usize = 1 + FIXED + TAIL;
 const SD3_DATA: usize = 8;
 const SD3_LEN: usize = SD1_LEN + SD3_DATA;
 const SD4_LEN: usize = 3;
+/// As long as nearly every telegram of a cycle: so many octets are written faster than counted.
+const SHORT: usize = 32;
 
 /// One telegram of the line, every field valid. EN 50170-2.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -370,13 +373,10 @@ impl Frame {
     }
     /// Becomes a copy of `other`.
     pub fn copy_from(&mut self, other: &Self) {
-        /// As long as nearly every telegram of a cycle: so many octets are copied faster than counted.
-        const SHORT: usize = 32;
         self.len = other.len;
-        if other.len() <= SHORT {
-            self.octets[..SHORT].copy_from_slice(&other.octets[..SHORT]);
-        } else {
-            self.octets_mut().copy_from_slice(other.octets());
+        self.octets[..SHORT].copy_from_slice(&other.octets[..SHORT]);
+        if let Some(rest) = other.octets().get(SHORT..) {
+            self.octets_mut()[SHORT..].copy_from_slice(rest);
         }
     }
     /// Reads the octets.
@@ -400,9 +400,10 @@ impl Frame {
     ///
     /// # Errors
     /// A source of 127, a service access point above 63, or a data unit that does not fit. The frame is then unchanged.
+    #[inline]
     pub fn set_data(&mut self, header: &Header, du: &[u8]) -> Result<(), TelegramError> {
         let (head, place) = self.start_data(header, du.len())?;
-        place.copy_from_slice(du);
+        self.octets[place].copy_from_slice(du);
         self.finish_data(head.wrapping_add(sum(du)));
         Ok(())
     }
@@ -410,6 +411,7 @@ impl Frame {
     ///
     /// # Errors
     /// As [`Frame::set_data`]; `write` is then not called.
+    #[inline]
     pub fn set_data_with(
         &mut self,
         header: &Header,
@@ -417,7 +419,11 @@ impl Frame {
         write: impl FnOnce(&mut [u8]),
     ) -> Result<(), TelegramError> {
         let (head, du) = self.start_data(header, len)?;
-        du.fill(0);
+        self.octets[du.start..du.start + SHORT].fill(0);
+        if len > SHORT {
+            self.octets[du.start + SHORT..du.end].fill(0);
+        }
+        let du = &mut self.octets[du];
         write(du);
         let fcs = head.wrapping_add(sum(du));
         self.finish_data(fcs);
@@ -445,7 +451,7 @@ impl Frame {
     }
     /// Writes everything before the data unit; its share of FCS, and the data unit's place. FCS is not summed up from
     /// the frame: reading octets just written one by one is the slowest thing one can do here.
-    fn start_data(&mut self, header: &Header, len: usize) -> Result<(u8, &mut [u8]), TelegramError> {
+    fn start_data(&mut self, header: &Header, len: usize) -> Result<(u8, Range<usize>), TelegramError> {
         let saps = header.sap_octets();
         let most = MAX_DU - saps;
         if len > most {
@@ -475,7 +481,7 @@ impl Frame {
             at += 1;
         }
         self.len = (at + len + TAIL) as u8;
-        Ok((fcs, &mut self.octets[at..at + len]))
+        Ok((fcs, at..at + len))
     }
     /// Writes FCS and ED behind the data unit.
     fn finish_data(&mut self, fcs: u8) {
