@@ -48,7 +48,8 @@ impl Faults {
     }
     /// The faults in the order of their codes.
     pub fn iter(self) -> impl Iterator<Item = SensorFault> {
-        SensorFault::ALL.iter().copied().filter(move |&fault| self.contains(fault))
+        let all = if self.is_empty() { &[] } else { SensorFault::ALL };
+        all.iter().copied().filter(move |&fault| self.contains(fault))
     }
 }
 impl From<SensorFault> for Faults {

@@ -206,10 +206,8 @@ impl<F: Function> Unit<F> {
             Input::Telegram(heard) => self.heard(now, heard, out),
             Input::Deadline { timer: Timer::SetPoint, .. } => self.body.set_point(now, out),
             Input::Sample(raw) if self.slave.state() == SlaveState::DataExch => self.body.latch(raw, true, out),
-            Input::Deadline { timer: Timer::Window, .. } => self.body.window_closed(now, out),
-            Input::Deadline { timer: Timer::Links, .. } => self.body.function.monitor(now, out),
             Input::PowerOn => self.power_on(now, out),
-            Input::Deadline { timer, .. } => self.slave_due(now, timer, out),
+            Input::Deadline { timer, .. } => self.due(now, timer, out),
             Input::Sent | Input::Sample(_) | Input::Command(_) => {}
         }
     }
@@ -230,10 +228,12 @@ impl<F: Function> Unit<F> {
             self.update_leds(now, true, out);
         }
     }
-    /// A deadline of the slave's or of the LEDs came due.
+    /// A deadline came due that does not in every cycle.
     #[cold]
-    fn slave_due(&mut self, now: Local, timer: Timer, out: &mut Outbox) {
+    fn due(&mut self, now: Local, timer: Timer, out: &mut Outbox) {
         match timer {
+            Timer::Window => self.body.window_closed(now, out),
+            Timer::Links => self.body.function.monitor(now, out),
             Timer::Watchdog => self.slave.watchdog(now, &mut self.body, out),
             Timer::Connection => self.slave.connection_due(now, &mut self.body, out),
             _ => {}
@@ -255,6 +255,7 @@ impl<F: Function> Body<F> {
     }
 
     /// The control words take effect: at T_O, or with each request while the clock is not locked.
+    #[inline]
     fn take_over(&mut self, out: &mut Outbox) {
         let causes = core::mem::take(&mut self.causes);
         self.answer = self.sensor.cycle(self.outputs.g1_stw.0, causes);
@@ -294,7 +295,6 @@ impl<F: Function> Body<F> {
         let inputs = observation::Inputs { zsw2: zsw2.0, g1_zsw: g1_zsw.0, xist1, xist2 };
         out.observe(Observation::Latch { locked, inputs });
     }
-    #[cold]
     fn window_closed(&mut self, now: Local, out: &mut Outbox) {
         let fault = self.iso.as_mut().and_then(|iso| iso.window_closed(now, out));
         self.raise(fault);

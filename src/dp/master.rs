@@ -57,7 +57,7 @@ use crate::fdl::{Filter, Input, Outbox, Station, Timer};
 use crate::observation::{HandlerState, MasterClass, MasterMode, Observation};
 use crate::time::{Local, Span};
 use crate::wire::control::GlobalControl;
-use crate::wire::{Address, Service, Status};
+use crate::wire::{Address, Frame, Service, Status};
 
 /// Characters of a Global_Control telegram.
 const GC_OCTETS: usize = 13;
@@ -170,6 +170,8 @@ pub struct Master<A> {
     handlers: Vec<Handler>,
     part: Part,
     app: A,
+    /// The clock telegram: it says the same in Clear and Operate (Model: D5).
+    synch: Frame,
     /// Start of the running cycle.
     t0: Local,
     /// Last bit of the last Data_Exchange answer, or t0.
@@ -198,9 +200,11 @@ impl<A: Application> Master<A> {
     /// A master without supply.
     pub fn new(settings: Settings, app: A) -> Self {
         let t_gc = settings.bus.rate.octets(GC_OCTETS);
+        let active = Active::new(settings.address, settings.bus);
         let third = Span::from_ticks(settings.data_control_time.ticks() / 3);
         Self {
-            active: Active::new(settings.address, settings.bus),
+            synch: active.clock(GLOBAL_CONTROL, &GlobalControl::SYNCH_OCTETS),
+            active,
             clock: CycleClock::new(settings.t_dp, t_gc, settings.rearm, Local::ZERO),
             mode: MasterMode::Offline,
             handlers: settings.slaves.iter().cloned().map(Handler::new).collect(),
@@ -314,8 +318,7 @@ impl<A: Application> Master<A> {
         if at > planned {
             out.observe(Observation::ClockLate { by: at - planned });
         }
-        // SYNCH says the same in Clear and Operate (Model: D5).
-        self.active.send_clock(at, GLOBAL_CONTROL, &GlobalControl::SYNCH.emit(), out);
+        self.active.send_clock(at, &self.synch, out);
         self.part = Part::Clock;
     }
 
@@ -424,8 +427,7 @@ impl<A: Application> Master<A> {
     }
     /// The one acyclic message: a slave's start-up and the acyclic job in turn; then the GAP.
     fn message(&mut self, now: Local, out: &mut Outbox) {
-        let count = self.handlers.len();
-        let mut slaves = (0..count).map(|i| (self.startup_next + i) % count);
+        let mut slaves = (self.startup_next..self.handlers.len()).chain(0..self.startup_next);
         let starting = slaves.find(|&slave| self.handlers[slave].has_service());
         // Also where the cycle had no time to ask.
         let since = self.ms1.since().unwrap_or(now);
@@ -574,7 +576,6 @@ impl<A: Application> Station for Master<A> {
 
 impl<A: Application> Master<A> {
     /// As [`Station::step`], but for orders: those are ignored here and taken by [`order`](Self::order).
-    #[inline(never)]
     pub fn take<C: Copy>(&mut self, now: Local, input: Input<'_, C>, out: &mut Outbox) {
         match input {
             Input::PowerOn => self.power_on(now, out),

@@ -255,21 +255,34 @@ impl Active {
     }
 
     /// Sends a telegram that nobody answers to `da`, its first bit at `at`. Returns its end.
+    ///
+    /// # Panics
+    /// Above 244 octets of data: a bug of the caller.
     pub fn broadcast(&mut self, at: Local, da: Address, saps: (Sap, Sap), du: &[u8], out: &mut Outbox) -> Local {
         let header = Header::request(da, self.address, Service::SdnHigh, Fcb::Unused).with_saps(saps.0, saps.1);
         let mut octets = 0;
-        out.send(at, |frame| octets = fill(frame, &header, du));
+        out.send(at, |frame| {
+            frame.set_data(&header, du).expect("a broadcast fits");
+            octets = frame.len();
+        });
         let end = at + self.bus.rate.octets(octets);
         self.free_at = end + self.t_id2;
         end
     }
-    /// Sends the clock telegram, its first bit at `at`; `Input::Sent` follows its last bit and
-    /// [`clock_sent`](Self::clock_sent) must then be called.
-    pub fn send_clock(&mut self, at: Local, saps: (Sap, Sap), du: &[u8], out: &mut Outbox) {
+    /// The clock telegram of this station.
+    ///
+    /// # Panics
+    /// Above 244 octets of data: a bug of the caller.
+    pub fn clock(&self, (dsap, ssap): (Sap, Sap), du: &[u8]) -> Frame {
         let header = Header::request(Address::BROADCAST, self.address, Service::SdnHigh, Fcb::Unused);
-        out.send_clock(at, |frame| {
-            fill(frame, &header.with_saps(saps.0, saps.1), du);
-        });
+        let mut frame = Frame::new();
+        frame.set_data(&header.with_saps(dsap, ssap), du).expect("a broadcast fits");
+        frame
+    }
+    /// Sends the [`clock`](Self::clock) telegram, its first bit at `at`; `Input::Sent` follows its last bit and
+    /// [`clock_sent`](Self::clock_sent) must then be called.
+    pub fn send_clock(&mut self, at: Local, clock: &Frame, out: &mut Outbox) {
+        out.send_clock(at, |frame| frame.copy_from(clock));
     }
     /// The last bit of the clock telegram left at `now`.
     pub fn clock_sent(&mut self, now: Local) {
@@ -445,11 +458,6 @@ impl Active {
         self.reset_peer(awaited.from);
         Confirm::NoReply
     }
-}
-
-fn fill(frame: &mut Frame, header: &Header, du: &[u8]) -> usize {
-    frame.set_data(header, du).expect("a broadcast fits");
-    frame.len()
 }
 
 const fn gap_answer(station: StationType) -> GapAnswer {
