@@ -184,7 +184,6 @@ impl Isochronous {
     }
 
     /// T_O: compares the master's sign of life. Returns the fault that this makes.
-    #[inline]
     pub fn set_point(&mut self, mls: u8, out: &mut Outbox) -> Option<SensorFault> {
         let before = self.life.state();
         let step = self.life.cycle(mls);

@@ -215,6 +215,9 @@ impl Latch {
     }
     /// Latches what is not latched yet and tells what that was.
     fn add(&mut self, causes: Faults) -> Faults {
+        if causes.is_empty() {
+            return Faults::NONE;
+        }
         let new = causes.without(self.set());
         for fault in new.iter() {
             if let Some(free) = self.faults.iter_mut().find(|place| place.is_none()) {

@@ -255,7 +255,6 @@ impl<F: Function> Body<F> {
     }
 
     /// The control words take effect: at T_O, or with each request while the clock is not locked.
-    #[inline]
     fn take_over(&mut self, out: &mut Outbox) {
         let causes = core::mem::take(&mut self.causes);
         self.answer = self.sensor.cycle(self.outputs.g1_stw.0, causes);

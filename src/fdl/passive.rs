@@ -116,7 +116,6 @@ impl Passive {
         }
     }
 
-    #[inline]
     fn is_repeated(&mut self, master: Address, fcb: Fcb) -> bool {
         let request = match fcb {
             Fcb::Unused => None,

@@ -61,27 +61,22 @@ impl<'a> Telegram<'a> {
     /// The first check that fails, in this order: start, length, repeats of length and start, end, sum, addresses, FC,
     /// service access points. A receiver stays silent in each case.
     pub fn parse(octets: &'a [u8]) -> Result<Self, TelegramError> {
-        match octets.first() {
-            None => Err(TelegramError::Empty),
-            Some(&SD2) => {
-                let covered = Self::check_sd2(octets)?;
-                Self::parse_covered(octets, SD2_HEAD, covered)
+        let (head, expected) = match octets.first() {
+            None => return Err(TelegramError::Empty),
+            Some(&SD2) => (SD2_HEAD, Self::sd2_len(octets)?),
+            Some(&SD4) => return Self::parse_token(octets),
+            Some(&SC) => {
+                return match octets.len() {
+                    1 => Ok(Self::ShortAck),
+                    found => Err(TelegramError::Length { expected: 1, found }),
+                };
             }
-            Some(&SD4) => Self::parse_token(octets),
-            Some(&SC) => match octets.len() {
-                1 => Ok(Self::ShortAck),
-                found => Err(TelegramError::Length { expected: 1, found }),
-            },
-            Some(&SD1) => {
-                let covered = check_tail(octets, 1, SD1_LEN)?;
-                Self::parse_covered(octets, 1, covered)
-            }
-            Some(&SD3) => {
-                let covered = check_tail(octets, 1, SD3_LEN)?;
-                Self::parse_covered(octets, 1, covered)
-            }
-            Some(&found) => Err(TelegramError::Start { offset: 0, found }),
-        }
+            Some(&SD1) => (1, SD1_LEN),
+            Some(&SD3) => (1, SD3_LEN),
+            Some(&found) => return Err(TelegramError::Start { offset: 0, found }),
+        };
+        let covered = check_tail(octets, head, expected)?;
+        Self::parse_covered(octets, head, covered)
     }
 
     /// Writes this telegram, SD3 as SD2.
@@ -112,7 +107,8 @@ impl<'a> Telegram<'a> {
         Ok(Self::Token { da: station(da, 1)?, sa: station(sa, 2)? })
     }
 
-    fn check_sd2(octets: &[u8]) -> Result<&[u8], TelegramError> {
+    /// Length of the frame that LE announces.
+    fn sd2_len(octets: &[u8]) -> Result<usize, TelegramError> {
         let &[_, le, ler, start, ..] = octets else {
             return Err(TelegramError::Length { expected: SD2_HEAD + LE_MIN + TAIL, found: octets.len() });
         };
@@ -126,7 +122,7 @@ impl<'a> Telegram<'a> {
         if start != SD2 {
             return Err(TelegramError::Start { offset: 3, found: start });
         }
-        check_tail(octets, SD2_HEAD, SD2_HEAD + covered + TAIL)
+        Ok(SD2_HEAD + covered + TAIL)
     }
 
     /// Reads DA, SA, FC, service access points and data unit; `head` is the offset of DA.
@@ -452,6 +448,19 @@ impl Frame {
     /// Writes everything before the data unit; its share of FCS, and the data unit's place. FCS is not summed up from
     /// the frame: reading octets just written one by one is the slowest thing one can do here.
     fn start_data(&mut self, header: &Header, len: usize) -> Result<(u8, Range<usize>), TelegramError> {
+        const DU: usize = SD2_HEAD + FIXED;
+        // Data_Exchange: nearly all that is written in a cycle.
+        if (header.dsap, header.ssap) == (None, None) && (1..=MAX_DU).contains(&len) && !header.sa.is_broadcast() {
+            let (da, sa, fc) = (header.da.get(), header.sa.get(), header.fc.octet());
+            let le = (FIXED + len) as u8;
+            self.octets[..DU].copy_from_slice(&[SD2, le, le, SD2, da, sa, fc]);
+            self.len = (DU + len + TAIL) as u8;
+            return Ok((da.wrapping_add(sa).wrapping_add(fc), DU..DU + len));
+        }
+        self.start_any_data(header, len)
+    }
+    /// The same, whatever the header says.
+    fn start_any_data(&mut self, header: &Header, len: usize) -> Result<(u8, Range<usize>), TelegramError> {
         let saps = header.sap_octets();
         let most = MAX_DU - saps;
         if len > most {
