@@ -460,6 +460,7 @@ impl Frame {
         self.start_any_data(header, len)
     }
     /// The same, whatever the header says.
+    #[cold]
     fn start_any_data(&mut self, header: &Header, len: usize) -> Result<(u8, Range<usize>), TelegramError> {
         let saps = header.sap_octets();
         let most = MAX_DU - saps;
