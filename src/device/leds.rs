@@ -128,15 +128,14 @@ impl LedLogic {
     pub const fn next_deadline(&self) -> Option<Local> {
         self.deadline
     }
+    /// As [`update`](Self::update) with a telegram in data exchange that goes on: it shows the same, whatever else there
+    /// is. A deadline of before is left to come.
+    pub const fn goes_on(&mut self, now: Local) {
+        self.heard = Some(now);
+    }
     /// Takes over what is the case at `now`; what the LEDs showed and show if this changed.
     pub fn update(&mut self, now: Local, input: LedInput) -> Option<(Leds, Leds)> {
         let from = self.leds;
-        // Data exchange that goes on shows the same, whatever else there is, and needs no deadline.
-        if input.powered && from == Leds::DataExchange && input.state == SlaveState::DataExch {
-            self.heard = if input.heard { Some(now) } else { self.heard };
-            self.deadline = self.deadline.filter(|&deadline| now < deadline);
-            return None;
-        }
         if !input.powered {
             *self = Self::default();
             return (from != self.leds).then_some((from, self.leds));

@@ -10,6 +10,7 @@ use crate::dp::master::{Master, Order, Overlong};
 use crate::fdl::active::HoldToken;
 use crate::fdl::{Filter, Input, Outbox, Station};
 use crate::observation::MasterMode;
+use crate::time::Local;
 use crate::wire::Address;
 use crate::wire::control::GlobalControl;
 
@@ -67,33 +68,45 @@ impl Station for Node {
             Self::Silent(address) => Filter::own(*address),
         }
     }
-    fn step(&mut self, now: crate::time::Local, input: Input<'_, Command>, out: &mut Outbox) {
+    fn step(&mut self, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
         match self {
-            Self::Master(master) => {
-                let input = input.map_command(|command| match command {
-                    Command::Mode(mode) => Some(Order::Mode(mode)),
-                    Command::Patch(slave, telegram, patch) => Some(Order::Patch(slave, telegram, patch)),
-                    Command::Control(control) => Some(Order::Control(control)),
-                    Command::HoldToken(order) => Some(Order::HoldToken(order)),
-                    Command::Overlong(order) => Some(Order::Overlong(order)),
-                    Command::Application(command) => Some(Order::Application(command)),
-                });
-                if let Some(input) = input {
-                    master.step(now, input, out);
-                }
-            }
-            Self::Class2(master) => {
-                let input = input.map_command(|command| match command {
-                    Command::HoldToken(order) => Some(order),
-                    _ => None,
-                });
-                if let Some(input) = input {
-                    master.step(now, input, out);
-                }
-            }
             Self::Encoder(encoder) => encoder.take(now, input, out),
             Self::Drive(drive) => drive.take(now, input, out),
+            Self::Master(master) => step_master(master, now, input, out),
+            Self::Class2(master) => step_class2(master, now, input, out),
             Self::Silent(_) => {}
         }
+    }
+}
+
+impl From<Command> for Order<ControllerCommand> {
+    fn from(command: Command) -> Self {
+        match command {
+            Command::Mode(mode) => Self::Mode(mode),
+            Command::Patch(slave, telegram, patch) => Self::Patch(slave, telegram, patch),
+            Command::Control(control) => Self::Control(control),
+            Command::HoldToken(order) => Self::HoldToken(order),
+            Command::Overlong(order) => Self::Overlong(order),
+            Command::Application(command) => Self::Application(command),
+        }
+    }
+}
+
+// Neither master is inlined: a step of the many encoders then saves no registers for what their commands are made of.
+#[inline(never)]
+fn step_master(master: &mut Master<Controller>, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
+    match input {
+        Input::Command(command) => master.order(command.into(), out),
+        input => master.take(now, input, out),
+    }
+}
+#[inline(never)]
+fn step_class2(master: &mut Class2<Tool>, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
+    let input = input.map_command(|command| match command {
+        Command::HoldToken(order) => Some(order),
+        _ => None,
+    });
+    if let Some(input) = input {
+        master.step(now, input, out);
     }
 }

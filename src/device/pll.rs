@@ -158,6 +158,20 @@ impl Fine {
     }
 }
 
+/// Between what the period stays: `T_DP` ± the first window, for further away no first window could catch it (Model: D11).
+#[derive(Clone, Copy, Debug)]
+struct Limits {
+    shortest: Fine,
+    longest: Fine,
+}
+
+impl Limits {
+    fn of(settings: &PllSettings) -> Self {
+        let (nominal, pull) = (Fine::of(settings.t_dp), Fine::of(settings.first_window()));
+        Self { shortest: nominal.minus(pull), longest: nominal.plus(pull) }
+    }
+}
+
 /// What the loop knows while it follows the clock.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Track {
@@ -178,12 +192,10 @@ impl Track {
     fn error(&self, arrival: Local) -> Fine {
         Fine::at(arrival).minus(self.next)
     }
-    /// Model: D11. The period stays within `T_DP` ± the first window: further away no first window could catch it.
-    fn corrected(self, error: Fine, settings: &PllSettings) -> Self {
+    /// Model: D11.
+    fn corrected(self, error: Fine, settings: &PllSettings, limits: Limits) -> Self {
         let next = self.next.plus(error.times(settings.kp)).plus(self.period);
-        let nominal = Fine::of(settings.t_dp);
-        let pull = Fine::of(settings.first_window());
-        let period = self.period.plus(error.times(settings.ki)).clamp(nominal.minus(pull), nominal.plus(pull));
+        let period = self.period.plus(error.times(settings.ki)).clamp(limits.shortest, limits.longest);
         Self { next, period, caught: true, ..self }
     }
     /// The next cycle without a correction.
@@ -231,6 +243,7 @@ pub struct Judgement {
 #[derive(Clone, Debug)]
 pub struct Pll {
     settings: PllSettings,
+    limits: Limits,
     state: State,
 }
 
@@ -243,7 +256,7 @@ impl Pll {
         assert!(settings.t_dp > Span::ZERO, "T_DP must be positive");
         assert!(settings.quantum > Span::ZERO, "the timer quantum must be positive");
         assert!(settings.kp.max(settings.ki) <= 1 << FRACTION_BITS, "a gain above one does not settle");
-        Self { settings, state: State::Idle }
+        Self { limits: Limits::of(&settings), settings, state: State::Idle }
     }
 
     /// Starts to look for the clock: the slave sees Operate and valid `Data_Exchange` (manual 2.1.2).
@@ -384,7 +397,7 @@ impl Pll {
             State::Narrowing { track, hits, .. } => {
                 let narrower = settings.narrowed(track.window);
                 let hits = hits + 1;
-                let track = track.corrected(error, settings);
+                let track = track.corrected(error, settings, self.limits);
                 if hits >= settings.hits_per_step {
                     self.following(Track { window: narrower, ..track }, 0, 0)
                 } else {
@@ -392,16 +405,17 @@ impl Pll {
                 }
             }
             State::Settling { track, hits, .. } => {
-                let track = track.corrected(error, settings);
+                let track = track.corrected(error, settings, self.limits);
                 if hits + 1 >= settings.hits_to_lock {
                     State::Locked { track, failures: 0 }
                 } else {
                     State::Settling { track, hits: hits + 1, failures: 0 }
                 }
             }
-            State::Locked { track, failures } => {
-                State::Locked { track: track.corrected(error, settings), failures: failures.saturating_sub(1) }
-            }
+            State::Locked { track, failures } => State::Locked {
+                track: track.corrected(error, settings, self.limits),
+                failures: failures.saturating_sub(1),
+            },
             state @ (State::Idle | State::Waiting { .. }) => state,
         }
     }

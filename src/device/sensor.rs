@@ -48,7 +48,8 @@ impl Faults {
     }
     /// The faults in the order of their codes.
     pub fn iter(self) -> impl Iterator<Item = SensorFault> {
-        SensorFault::ALL.iter().copied().filter(move |&fault| self.contains(fault))
+        let all = if self.is_empty() { &[] } else { SensorFault::ALL };
+        all.iter().copied().filter(move |&fault| self.contains(fault))
     }
 }
 impl From<SensorFault> for Faults {
@@ -214,6 +215,9 @@ impl Latch {
     }
     /// Latches what is not latched yet and tells what that was.
     fn add(&mut self, causes: Faults) -> Faults {
+        if causes.is_empty() {
+            return Faults::NONE;
+        }
         let new = causes.without(self.set());
         for fault in new.iter() {
             if let Some(free) = self.faults.iter_mut().find(|place| place.is_none()) {

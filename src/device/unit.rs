@@ -16,7 +16,7 @@ use crate::device::sensor::{Answer, Faults, Preset, Sensor, SensorOptions, Xist1
 use crate::dp::ms1::{Access, Records};
 use crate::dp::ms2;
 use crate::dp::slave::{ACYCLIC_TIME, Application, Identity, Refusal, Slave};
-use crate::fdl::{Filter, Input, Outbox, Station, Timer};
+use crate::fdl::{Filter, Heard, Input, Outbox, Station, Timer};
 use crate::observation::{self, Leds, Observation, Phase, SlaveState};
 use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::Address;
@@ -182,6 +182,7 @@ impl<F: Function> Unit<F> {
     pub const fn leds(&self) -> Leds {
         self.leds.leds()
     }
+    /// To be called after whatever may have changed the slave's state.
     fn update_leds(&mut self, now: Local, heard: bool, out: &mut Outbox) {
         let input = LedInput { powered: true, state: self.slave.state(), fault: self.slave.has_fault(), heard };
         let before = self.leds.next_deadline();
@@ -198,27 +199,46 @@ impl<F: Function> Unit<F> {
     }
 
     /// As [`Station::step`], where stations of other kinds take orders; a unit does not.
-    #[inline]
+    ///
+    /// What comes in every cycle is not inlined: each input then saves the registers that it needs itself.
     pub fn take<C: Copy>(&mut self, now: Local, input: Input<'_, C>, out: &mut Outbox) {
-        let heard = matches!(input, Input::Telegram(_));
         match input {
-            Input::PowerOn => {
-                self.leds = LedLogic::default();
-                self.body.reset(out);
-                self.body.function.leave(out);
-                self.slave.power_on(now, &mut self.body, out);
-            }
-            Input::Telegram(heard) => self.slave.heard(now, heard, &mut self.body, out),
-            Input::Deadline { timer: Timer::Watchdog, .. } => self.slave.watchdog(now, &mut self.body, out),
-            Input::Deadline { timer: Timer::Connection, .. } => self.slave.connection_due(now, &mut self.body, out),
-            Input::Deadline { timer: Timer::Window, .. } => self.body.window_closed(now, out),
+            Input::Telegram(heard) => self.heard(now, heard, out),
             Input::Deadline { timer: Timer::SetPoint, .. } => self.body.set_point(now, out),
-            Input::Deadline { timer: Timer::Links, .. } => self.body.function.monitor(now, out),
             Input::Sample(raw) if self.slave.state() == SlaveState::DataExch => self.body.latch(raw, true, out),
-            Input::Deadline { .. } | Input::Sent | Input::Sample(_) => {}
-            Input::Command(_) => return,
+            Input::PowerOn => self.power_on(now, out),
+            Input::Deadline { timer, .. } => self.due(now, timer, out),
+            Input::Sent | Input::Sample(_) | Input::Command(_) => {}
         }
-        self.update_leds(now, heard, out);
+    }
+    #[cold]
+    fn power_on(&mut self, now: Local, out: &mut Outbox) {
+        self.leds = LedLogic::default();
+        self.body.reset(out);
+        self.body.function.leave(out);
+        self.slave.power_on(now, &mut self.body, out);
+        self.update_leds(now, false, out);
+    }
+    #[inline(never)]
+    fn heard(&mut self, now: Local, heard: Heard<'_>, out: &mut Outbox) {
+        self.slave.heard(now, heard, &mut self.body, out);
+        if self.slave.state() == SlaveState::DataExch && self.leds.leds() == Leds::DataExchange {
+            self.leds.goes_on(now);
+        } else {
+            self.update_leds(now, true, out);
+        }
+    }
+    /// A deadline came due that does not in every cycle.
+    #[cold]
+    fn due(&mut self, now: Local, timer: Timer, out: &mut Outbox) {
+        match timer {
+            Timer::Window => self.body.window_closed(now, out),
+            Timer::Links => self.body.function.monitor(now, out),
+            Timer::Watchdog => self.slave.watchdog(now, &mut self.body, out),
+            Timer::Connection => self.slave.connection_due(now, &mut self.body, out),
+            _ => {}
+        }
+        self.update_leds(now, false, out);
     }
 }
 
@@ -255,6 +275,7 @@ impl<F: Function> Body<F> {
         }
     }
     /// Takes the position for the next reply.
+    #[inline(never)]
     fn latch(&mut self, raw: u32, locked: bool, out: &mut Outbox) {
         self.raw = raw;
         let (xist1, position) = self.function.position(raw);
@@ -277,6 +298,7 @@ impl<F: Function> Body<F> {
         let fault = self.iso.as_mut().and_then(|iso| iso.window_closed(now, out));
         self.raise(fault);
     }
+    #[inline(never)]
     fn set_point(&mut self, now: Local, out: &mut Outbox) {
         let mls = (self.outputs.stw2.0 >> 12) as u8;
         let fault = self.iso.as_mut().and_then(|iso| iso.set_point(mls, out));

@@ -42,7 +42,11 @@ impl CycleClock {
     /// Leaves out the cycles whose SYNCH should have left a whole T_DP and more before `now`: the grid goes on
     /// (Model: D1), numbers count what is sent. Returns how many.
     pub fn miss(&mut self, now: Local) -> u64 {
-        let missed = (now - self.planned()).div_floor(self.t_dp).max(0);
+        let late = now - self.planned();
+        if late < self.t_dp {
+            return 0;
+        }
+        let missed = late.div_floor(self.t_dp);
         self.nominal += self.t_dp * missed;
         self.aim += self.t_dp * missed;
         missed as u64

@@ -57,7 +57,7 @@ use crate::fdl::{Filter, Input, Outbox, Station, Timer};
 use crate::observation::{HandlerState, MasterClass, MasterMode, Observation};
 use crate::time::{Local, Span};
 use crate::wire::control::GlobalControl;
-use crate::wire::{Address, Service, Status};
+use crate::wire::{Address, Frame, Service, Status};
 
 /// Characters of a Global_Control telegram.
 const GC_OCTETS: usize = 13;
@@ -170,12 +170,13 @@ pub struct Master<A> {
     handlers: Vec<Handler>,
     part: Part,
     app: A,
+    /// The clock telegram: it says the same in Clear and Operate (Model: D5).
+    synch: Frame,
     /// Start of the running cycle.
     t0: Local,
     /// Last bit of the last Data_Exchange answer, or t0.
     exchange_end: Local,
     exchanged: bool,
-    retries: u32,
     /// The mode has to be told to the slaves.
     control_due: bool,
     /// Cycle in which it was told last, and after how many it is told again.
@@ -199,9 +200,11 @@ impl<A: Application> Master<A> {
     /// A master without supply.
     pub fn new(settings: Settings, app: A) -> Self {
         let t_gc = settings.bus.rate.octets(GC_OCTETS);
+        let active = Active::new(settings.address, settings.bus);
         let third = Span::from_ticks(settings.data_control_time.ticks() / 3);
         Self {
-            active: Active::new(settings.address, settings.bus),
+            synch: active.clock(GLOBAL_CONTROL, &GlobalControl::SYNCH_OCTETS),
+            active,
             clock: CycleClock::new(settings.t_dp, t_gc, settings.rearm, Local::ZERO),
             mode: MasterMode::Offline,
             handlers: settings.slaves.iter().cloned().map(Handler::new).collect(),
@@ -210,7 +213,6 @@ impl<A: Application> Master<A> {
             t0: Local::ZERO,
             exchange_end: Local::ZERO,
             exchanged: false,
-            retries: 0,
             control_due: true,
             control_told: 0,
             // Never in every cycle: slaves start up in the acyclic part too.
@@ -316,8 +318,7 @@ impl<A: Application> Master<A> {
         if at > planned {
             out.observe(Observation::ClockLate { by: at - planned });
         }
-        // SYNCH says the same in Clear and Operate (Model: D5).
-        self.active.send_clock(at, GLOBAL_CONTROL, &GlobalControl::SYNCH.emit(), out);
+        self.active.send_clock(at, &self.synch, out);
         self.part = Part::Clock;
     }
 
@@ -333,7 +334,7 @@ impl<A: Application> Master<A> {
         self.t0 = now;
         self.exchange_end = now;
         self.exchanged = false;
-        self.retries = 0;
+        self.active.count_anew();
         self.overload.cycle_begins();
         out.observe(Observation::CycleStart { cycle, nominal });
         let (mode, to_blame) = self.supervision.cycle(now, cycle - self.begun, self.mode, &self.handlers);
@@ -403,7 +404,8 @@ impl<A: Application> Master<A> {
     }
     fn exchange_done(&mut self, out: &mut Outbox) {
         if self.exchanged {
-            out.observe(Observation::ExchangeDone { t_dx: self.exchange_end - self.t0, retries: self.retries });
+            let retries = self.active.repeats();
+            out.observe(Observation::ExchangeDone { t_dx: self.exchange_end - self.t0, retries });
         }
         self.acyclic(self.exchange_end, out);
     }
@@ -425,8 +427,7 @@ impl<A: Application> Master<A> {
     }
     /// The one acyclic message: a slave's start-up and the acyclic job in turn; then the GAP.
     fn message(&mut self, now: Local, out: &mut Outbox) {
-        let count = self.handlers.len();
-        let mut slaves = (0..count).map(|i| (self.startup_next + i) % count);
+        let mut slaves = (self.startup_next..self.handlers.len()).chain(0..self.startup_next);
         let starting = slaves.find(|&slave| self.handlers[slave].has_service());
         // Also where the cycle had no time to ask.
         let since = self.ms1.since().unwrap_or(now);
@@ -567,40 +568,45 @@ impl<A: Application> Station for Master<A> {
     }
     fn step(&mut self, now: Local, input: Input<'_, Self::Command>, out: &mut Outbox) {
         match input {
+            Input::Command(order) => self.order(order, out),
+            input => self.take(now, input, out),
+        }
+    }
+}
+
+impl<A: Application> Master<A> {
+    /// As [`Station::step`], but for orders: those are ignored here and taken by [`order`](Self::order).
+    pub fn take<C: Copy>(&mut self, now: Local, input: Input<'_, C>, out: &mut Outbox) {
+        match input {
             Input::PowerOn => self.power_on(now, out),
             Input::Telegram(heard) => {
                 let confirm = self.active.heard(now, heard, out);
-                self.count_retry(out);
                 self.confirmed(now, confirm, out);
             }
             Input::Sent if self.part == Part::Clock => self.clock_sent(now, out),
             Input::Sent if self.bereft => self.cycle_begins(now, out),
             Input::Deadline { timer: Timer::Slot, busy } => {
                 let confirm = self.active.slot_over(now, busy, out);
-                self.count_retry(out);
                 self.confirmed(now, confirm, out);
             }
             Input::Deadline { timer: Timer::Schedule, .. } => self.scheduled(now, out),
-            Input::Command(Order::Mode(mode)) if self.mode >= MasterMode::Clear => {
+            Input::Sent | Input::Deadline { .. } | Input::Sample(_) | Input::Command(_) => {}
+        }
+    }
+    /// Takes an order.
+    #[cold]
+    pub fn order(&mut self, order: Order<A::Command>, out: &mut Outbox) {
+        match order {
+            Order::Mode(mode) if self.mode >= MasterMode::Clear => {
                 self.supervision.ordered();
                 self.set_mode(mode, out);
             }
-            Input::Command(Order::Control(control)) if self.mode >= MasterMode::Clear => self.commands.push(control),
-            Input::Sent
-            | Input::Deadline { .. }
-            | Input::Sample(_)
-            | Input::Command(Order::Mode(_) | Order::Control(_)) => {}
-            Input::Command(Order::Patch(slave, telegram, patch)) => self.patch(slave, telegram, &patch, out),
-            Input::Command(Order::HoldToken(order)) => self.active.hold_token(order),
-            Input::Command(Order::Overlong(order)) => self.overload(order),
-            Input::Command(Order::Application(command)) => self.app.command(command, out),
+            Order::Control(control) if self.mode >= MasterMode::Clear => self.commands.push(control),
+            Order::Mode(_) | Order::Control(_) => {}
+            Order::Patch(slave, telegram, patch) => self.patch(slave, telegram, &patch, out),
+            Order::HoldToken(order) => self.active.hold_token(order),
+            Order::Overlong(order) => self.overload(order),
+            Order::Application(command) => self.app.command(command, out),
         }
-    }
-}
-
-impl<A: Application> Master<A> {
-    /// The active station repeats on its own and says so in this step's observations.
-    fn count_retry(&mut self, out: &Outbox) {
-        self.retries += u32::from(out.observations().any(|seen| matches!(seen, Observation::Retry { .. })));
     }
 }

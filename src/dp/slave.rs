@@ -269,9 +269,16 @@ impl Slave {
     }
 
     fn request(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
+        match (request.header.dsap, request.header.ssap) {
+            (None, None) => self.data_exchange(request, app, out),
+            _ => self.service(request, app, out),
+        }
+    }
+    /// A request for a service access point.
+    #[cold]
+    fn service(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
         let &Arrived { now, header, du, .. } = request;
         match (header.dsap, header.ssap) {
-            (None, None) => self.data_exchange(request, app, out),
             (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, header.sa, app, out),
             (Some(Sap::GET_CFG), Some(Sap::MASTER_MS0)) => {
                 let config = &self.identity.config;
@@ -316,6 +323,7 @@ impl Slave {
             None => out.disarm(Timer::Connection),
         }
     }
+    #[cold]
     fn refuse(&mut self, now: Local, out: &mut Outbox) {
         self.passive.reply(now, Status::Rs, 0, out, |_| ());
     }
@@ -452,15 +460,17 @@ impl Slave {
         if !control || self.state != SlaveState::DataExch || self.is_foreign(header.sa) {
             return;
         }
-        match GlobalControl::parse(du) {
-            Ok(control) if control.is_synch() => app.synch(now, out),
-            Ok(control) if control.selects(self.group) => {
-                app.operate(now, !control.clear, out);
-                self.control(now, control, sample, app, out);
-            }
-            _ => {}
+        if *du == GlobalControl::SYNCH_OCTETS {
+            return app.synch(now, out);
+        }
+        if let Ok(control) = GlobalControl::parse(du)
+            && control.selects(self.group)
+        {
+            app.operate(now, !control.clear, out);
+            self.control(now, control, sample, app, out);
         }
     }
+    #[cold]
     fn control(
         &mut self,
         now: Local,
@@ -487,6 +497,7 @@ impl Slave {
         self.unlock(cause, now, app, out);
         self.fault = fault;
     }
+    #[cold]
     fn unlock(&mut self, cause: SlaveCause, now: Local, app: &mut impl Application, out: &mut Outbox) {
         self.master = None;
         self.watchdog = None;

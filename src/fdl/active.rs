@@ -148,6 +148,7 @@ pub struct Active {
     asked_until: Local,
     /// How much longer than it has to the station keeps each token.
     hold: Span,
+    repeats: u32,
 }
 
 /// An order of the scenario: from now on the station keeps each token so much longer before it passes it on, as a slow
@@ -174,6 +175,7 @@ impl Active {
             doubted: None,
             asked_until: Local::ZERO,
             hold: Span::ZERO,
+            repeats: 0,
         }
     }
     /// Keeps tokens longer from now on.
@@ -207,6 +209,14 @@ impl Active {
         let rate = self.bus.rate;
         let answered = rate.span(self.bus.max_tsdr) + rate.octets(reply);
         rate.octets(octets) + answered.max(self.t_sl)
+    }
+    /// How many requests were repeated since [`count_anew`](Self::count_anew).
+    pub const fn repeats(&self) -> u32 {
+        self.repeats
+    }
+    /// From now on repeats are counted from zero.
+    pub const fn count_anew(&mut self) {
+        self.repeats = 0;
     }
     /// What this station knows of the ring.
     pub const fn ring(&self) -> &Ring {
@@ -245,21 +255,34 @@ impl Active {
     }
 
     /// Sends a telegram that nobody answers to `da`, its first bit at `at`. Returns its end.
+    ///
+    /// # Panics
+    /// Above 244 octets of data: a bug of the caller.
     pub fn broadcast(&mut self, at: Local, da: Address, saps: (Sap, Sap), du: &[u8], out: &mut Outbox) -> Local {
         let header = Header::request(da, self.address, Service::SdnHigh, Fcb::Unused).with_saps(saps.0, saps.1);
         let mut octets = 0;
-        out.send(at, |frame| octets = fill(frame, &header, du));
+        out.send(at, |frame| {
+            frame.set_data(&header, du).expect("a broadcast fits");
+            octets = frame.len();
+        });
         let end = at + self.bus.rate.octets(octets);
         self.free_at = end + self.t_id2;
         end
     }
-    /// Sends the clock telegram, its first bit at `at`; `Input::Sent` follows its last bit and
-    /// [`clock_sent`](Self::clock_sent) must then be called.
-    pub fn send_clock(&mut self, at: Local, saps: (Sap, Sap), du: &[u8], out: &mut Outbox) {
+    /// The clock telegram of this station.
+    ///
+    /// # Panics
+    /// Above 244 octets of data: a bug of the caller.
+    pub fn clock(&self, (dsap, ssap): (Sap, Sap), du: &[u8]) -> Frame {
         let header = Header::request(Address::BROADCAST, self.address, Service::SdnHigh, Fcb::Unused);
-        out.send_clock(at, |frame| {
-            fill(frame, &header.with_saps(saps.0, saps.1), du);
-        });
+        let mut frame = Frame::new();
+        frame.set_data(&header.with_saps(dsap, ssap), du).expect("a broadcast fits");
+        frame
+    }
+    /// Sends the [`clock`](Self::clock) telegram, its first bit at `at`; `Input::Sent` follows its last bit and
+    /// [`clock_sent`](Self::clock_sent) must then be called.
+    pub fn send_clock(&mut self, at: Local, clock: &Frame, out: &mut Outbox) {
+        out.send_clock(at, |frame| frame.copy_from(clock));
     }
     /// The last bit of the clock telegram left at `now`.
     pub fn clock_sent(&mut self, now: Local) {
@@ -423,6 +446,7 @@ impl Active {
         self.goes_on(now, out);
         if awaited.retries_left > 0 {
             out.observe(Observation::Retry { slave: awaited.from });
+            self.repeats += 1;
             self.send_last(self.free_at, out);
             self.state = State::AwaitDataResponse(Awaited {
                 retries_left: awaited.retries_left - 1,
@@ -434,11 +458,6 @@ impl Active {
         self.reset_peer(awaited.from);
         Confirm::NoReply
     }
-}
-
-fn fill(frame: &mut Frame, header: &Header, du: &[u8]) -> usize {
-    frame.set_data(header, du).expect("a broadcast fits");
-    frame.len()
 }
 
 const fn gap_answer(station: StationType) -> GapAnswer {

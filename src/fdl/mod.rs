@@ -183,13 +183,14 @@ pub struct Outbox {
     send: Option<Send>,
     /// What becomes of the deadlines; an entry counts if its bit in `ordered` is set.
     orders: [Order; Self::DEADLINES],
-    ordered: u16,
+    ordered: u32,
     cycle_at: Option<Local>,
     sample_with_telegrams: Option<bool>,
     filter_changed: bool,
     /// Any of the three before is set.
     unusual: bool,
-    observations: [Option<Observation>; Self::MAX_OBSERVATIONS],
+    /// Those behind the first `observed` are of earlier steps.
+    observations: [Observation; Self::MAX_OBSERVATIONS],
     observed: usize,
 }
 
@@ -237,7 +238,7 @@ impl Outbox {
             sample_with_telegrams: None,
             filter_changed: false,
             unusual: false,
-            observations: [None; Self::MAX_OBSERVATIONS],
+            observations: [Observation::OrderLost; Self::MAX_OBSERVATIONS],
             observed: 0,
         }
     }
@@ -304,7 +305,7 @@ impl Outbox {
     }
     /// Tells what was seen or done.
     pub fn observe(&mut self, observation: Observation) {
-        self.observations[self.observed] = Some(observation);
+        self.observations[self.observed] = observation;
         self.observed += 1;
     }
 
@@ -324,7 +325,10 @@ impl Outbox {
     pub fn orders(&self) -> impl Iterator<Item = (usize, Order)> {
         let mut left = self.ordered;
         core::iter::from_fn(move || {
-            let which = (left != 0).then(|| left.trailing_zeros() as usize)?;
+            if left == 0 {
+                return None;
+            }
+            let which = left.trailing_zeros() as usize;
             left &= left - 1;
             Some((which, self.orders[which]))
         })
@@ -344,7 +348,7 @@ impl Outbox {
     }
     /// What was observed, in order.
     pub fn observations(&self) -> impl Iterator<Item = &Observation> {
-        self.observations[..self.observed].iter().flatten()
+        self.observations[..self.observed].iter()
     }
 }
 

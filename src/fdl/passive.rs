@@ -60,15 +60,16 @@ pub struct Passive {
 /// What is kept to recognise a repeated request.
 #[derive(Clone, Debug)]
 struct Memory {
-    master: Option<Address>,
-    fcb: bool,
+    /// Who asked last, and with which FCB; none where it was not counted.
+    request: Option<(Address, bool)>,
+    /// What was answered; empty while nothing was.
     reply: Frame,
 }
 
 impl Passive {
     /// A station at `address` that needs `own_tsdr` to answer.
     pub fn new(address: Address, rate: BitRate, own_tsdr: Tbit) -> Self {
-        let memory = Memory { master: None, fcb: false, reply: Frame::new() };
+        let memory = Memory { request: None, reply: Frame::new() };
         Self { address, rate, own_tsdr, min_tsdr: Tbit(11), memory, pending: None }
     }
     /// The station's address.
@@ -87,6 +88,7 @@ impl Passive {
     }
 
     /// Takes a telegram whose last bit arrived at `now`.
+    #[inline]
     pub fn heard<'a>(&mut self, now: Local, heard: Heard<'a>, out: &mut Outbox) -> Indication<'a> {
         // A broken telegram is dropped without a word (EN 50170-2).
         let Ok(Telegram::Data { header, du }) = Telegram::parse(heard.octets) else { return Indication::Nothing };
@@ -104,8 +106,7 @@ impl Passive {
             }
             FrameControl::Request { service, fcb } if service.expects_reply() => {
                 if self.is_repeated(header.sa, fcb) {
-                    let reply = &self.memory.reply;
-                    out.send(now + self.rate.span(self.t_sdr()), |frame| frame.copy_from(reply));
+                    self.reply_again(now, out);
                     return Indication::Nothing;
                 }
                 self.pending = Some(header);
@@ -116,24 +117,24 @@ impl Passive {
     }
 
     fn is_repeated(&mut self, master: Address, fcb: Fcb) -> bool {
-        let memory = &mut self.memory;
-        let (known, bit) = match fcb {
-            Fcb::Unused => {
-                memory.master = None;
-                return false;
+        let request = match fcb {
+            Fcb::Unused => None,
+            Fcb::First => Some((master, true)),
+            Fcb::Alternate(bit) if self.memory.request == Some((master, bit)) && !self.memory.reply.is_empty() => {
+                return true;
             }
-            Fcb::First => (false, true),
-            Fcb::Alternate(bit) => (memory.master == Some(master), bit),
+            Fcb::Alternate(bit) => Some((master, bit)),
         };
-        if known && memory.fcb == bit && !memory.reply.is_empty() {
-            return true;
-        }
-        memory.master = Some(master);
-        memory.fcb = bit;
-        memory.reply.clear();
+        self.memory.request = request;
+        self.memory.reply.clear();
         false
     }
 
+    #[cold]
+    fn reply_again(&self, now: Local, out: &mut Outbox) {
+        out.send(now + self.rate.span(self.t_sdr()), |frame| frame.copy_from(&self.memory.reply));
+    }
+    #[cold]
     fn answer_status(&self, now: Local, request: &Header, out: &mut Outbox) {
         let fc = FrameControl::Response { station: StationType::Slave, status: Status::Ok };
         let header = Header { da: request.sa, sa: self.address, dsap: None, ssap: None, fc };

@@ -42,6 +42,8 @@ impl GlobalControl {
     pub const CLEAR: Self = Self { clear: true, ..Self::OPERATE };
     /// The clock: `00 80`. Its last bit is the start of the DP cycle (VPC3+ driver, D5).
     pub const SYNCH: Self = Self { groups: 0x80, ..Self::OPERATE };
+    /// The data unit of the clock.
+    pub const SYNCH_OCTETS: [u8; Self::LEN] = [0x00, 0x80];
 
     /// Reads the data unit.
     ///

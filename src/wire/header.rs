@@ -227,15 +227,31 @@ impl FrameControl {
     /// # Errors
     /// The code in bits 3..0 is not assigned, or bit 7 is 1 in anything but a clock value.
     pub const fn from_octet(octet: u8) -> Result<Self, ReservedFrameControl> {
+        match Self::ALL[octet as usize] {
+            Some(fc) => Ok(fc),
+            None => Err(ReservedFrameControl(octet)),
+        }
+    }
+    /// What each octet means.
+    const ALL: [Option<Self>; 256] = {
+        let mut all = [None; 256];
+        let mut octet = 0;
+        while octet < all.len() {
+            all[octet] = Self::of(octet as u8);
+            octet += 1;
+        }
+        all
+    };
+    const fn of(octet: u8) -> Option<Self> {
         if octet & 0x40 != 0 {
             match Service::from_code(octet & 0x8F) {
-                Some(service) => Ok(Self::Request { service, fcb: Fcb::from_bits(octet) }),
-                None => Err(ReservedFrameControl(octet)),
+                Some(service) => Some(Self::Request { service, fcb: Fcb::from_bits(octet) }),
+                None => None,
             }
         } else {
             match (StationType::from_code(octet & 0x30), Status::from_code(octet & 0x8F)) {
-                (Some(station), Some(status)) => Ok(Self::Response { station, status }),
-                _ => Err(ReservedFrameControl(octet)),
+                (Some(station), Some(status)) => Some(Self::Response { station, status }),
+                _ => None,
             }
         }
     }

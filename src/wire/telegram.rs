@@ -2,6 +2,7 @@
 
 use super::header::{Address, FrameControl, Header, Sap};
 use core::fmt;
+use core::ops::Range;
 
 /// Octets of the longest frame: SD2 with LE = 249. EN 50170-2.
 pub const MAX_FRAME: usize = 255;
@@ -29,6 +30,8 @@ const SD1_LEN: usize = 1 + FIXED + TAIL;
 const SD3_DATA: usize = 8;
 const SD3_LEN: usize = SD1_LEN + SD3_DATA;
 const SD4_LEN: usize = 3;
+/// As long as nearly every telegram of a cycle: so many octets are written faster than counted.
+const SHORT: usize = 32;
 
 /// One telegram of the line, every field valid. EN 50170-2.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -58,27 +61,22 @@ impl<'a> Telegram<'a> {
     /// The first check that fails, in this order: start, length, repeats of length and start, end, sum, addresses, FC,
     /// service access points. A receiver stays silent in each case.
     pub fn parse(octets: &'a [u8]) -> Result<Self, TelegramError> {
-        match octets.first() {
-            None => Err(TelegramError::Empty),
-            Some(&SD2) => {
-                let covered = Self::check_sd2(octets)?;
-                Self::parse_covered(octets, SD2_HEAD, covered)
+        let (head, expected) = match octets.first() {
+            None => return Err(TelegramError::Empty),
+            Some(&SD2) => (SD2_HEAD, Self::sd2_len(octets)?),
+            Some(&SD4) => return Self::parse_token(octets),
+            Some(&SC) => {
+                return match octets.len() {
+                    1 => Ok(Self::ShortAck),
+                    found => Err(TelegramError::Length { expected: 1, found }),
+                };
             }
-            Some(&SD4) => Self::parse_token(octets),
-            Some(&SC) => match octets.len() {
-                1 => Ok(Self::ShortAck),
-                found => Err(TelegramError::Length { expected: 1, found }),
-            },
-            Some(&SD1) => {
-                let covered = check_tail(octets, 1, SD1_LEN)?;
-                Self::parse_covered(octets, 1, covered)
-            }
-            Some(&SD3) => {
-                let covered = check_tail(octets, 1, SD3_LEN)?;
-                Self::parse_covered(octets, 1, covered)
-            }
-            Some(&found) => Err(TelegramError::Start { offset: 0, found }),
-        }
+            Some(&SD1) => (1, SD1_LEN),
+            Some(&SD3) => (1, SD3_LEN),
+            Some(&found) => return Err(TelegramError::Start { offset: 0, found }),
+        };
+        let covered = check_tail(octets, head, expected)?;
+        Self::parse_covered(octets, head, covered)
     }
 
     /// Writes this telegram, SD3 as SD2.
@@ -109,7 +107,8 @@ impl<'a> Telegram<'a> {
         Ok(Self::Token { da: station(da, 1)?, sa: station(sa, 2)? })
     }
 
-    fn check_sd2(octets: &[u8]) -> Result<&[u8], TelegramError> {
+    /// Length of the frame that LE announces.
+    fn sd2_len(octets: &[u8]) -> Result<usize, TelegramError> {
         let &[_, le, ler, start, ..] = octets else {
             return Err(TelegramError::Length { expected: SD2_HEAD + LE_MIN + TAIL, found: octets.len() });
         };
@@ -123,7 +122,7 @@ impl<'a> Telegram<'a> {
         if start != SD2 {
             return Err(TelegramError::Start { offset: 3, found: start });
         }
-        check_tail(octets, SD2_HEAD, SD2_HEAD + covered + TAIL)
+        Ok(SD2_HEAD + covered + TAIL)
     }
 
     /// Reads DA, SA, FC, service access points and data unit; `head` is the offset of DA.
@@ -370,13 +369,10 @@ impl Frame {
     }
     /// Becomes a copy of `other`.
     pub fn copy_from(&mut self, other: &Self) {
-        /// As long as nearly every telegram of a cycle: so many octets are copied faster than counted.
-        const SHORT: usize = 32;
         self.len = other.len;
-        if other.len() <= SHORT {
-            self.octets[..SHORT].copy_from_slice(&other.octets[..SHORT]);
-        } else {
-            self.octets_mut().copy_from_slice(other.octets());
+        self.octets[..SHORT].copy_from_slice(&other.octets[..SHORT]);
+        if let Some(rest) = other.octets().get(SHORT..) {
+            self.octets_mut()[SHORT..].copy_from_slice(rest);
         }
     }
     /// Reads the octets.
@@ -400,9 +396,10 @@ impl Frame {
     ///
     /// # Errors
     /// A source of 127, a service access point above 63, or a data unit that does not fit. The frame is then unchanged.
+    #[inline]
     pub fn set_data(&mut self, header: &Header, du: &[u8]) -> Result<(), TelegramError> {
         let (head, place) = self.start_data(header, du.len())?;
-        place.copy_from_slice(du);
+        self.octets[place].copy_from_slice(du);
         self.finish_data(head.wrapping_add(sum(du)));
         Ok(())
     }
@@ -410,6 +407,7 @@ impl Frame {
     ///
     /// # Errors
     /// As [`Frame::set_data`]; `write` is then not called.
+    #[inline]
     pub fn set_data_with(
         &mut self,
         header: &Header,
@@ -417,7 +415,11 @@ impl Frame {
         write: impl FnOnce(&mut [u8]),
     ) -> Result<(), TelegramError> {
         let (head, du) = self.start_data(header, len)?;
-        du.fill(0);
+        self.octets[du.start..du.start + SHORT].fill(0);
+        if len > SHORT {
+            self.octets[du.start + SHORT..du.end].fill(0);
+        }
+        let du = &mut self.octets[du];
         write(du);
         let fcs = head.wrapping_add(sum(du));
         self.finish_data(fcs);
@@ -445,7 +447,21 @@ impl Frame {
     }
     /// Writes everything before the data unit; its share of FCS, and the data unit's place. FCS is not summed up from
     /// the frame: reading octets just written one by one is the slowest thing one can do here.
-    fn start_data(&mut self, header: &Header, len: usize) -> Result<(u8, &mut [u8]), TelegramError> {
+    fn start_data(&mut self, header: &Header, len: usize) -> Result<(u8, Range<usize>), TelegramError> {
+        const DU: usize = SD2_HEAD + FIXED;
+        // Data_Exchange: nearly all that is written in a cycle.
+        if (header.dsap, header.ssap) == (None, None) && (1..=MAX_DU).contains(&len) && !header.sa.is_broadcast() {
+            let (da, sa, fc) = (header.da.get(), header.sa.get(), header.fc.octet());
+            let le = (FIXED + len) as u8;
+            self.octets[..DU].copy_from_slice(&[SD2, le, le, SD2, da, sa, fc]);
+            self.len = (DU + len + TAIL) as u8;
+            return Ok((da.wrapping_add(sa).wrapping_add(fc), DU..DU + len));
+        }
+        self.start_any_data(header, len)
+    }
+    /// The same, whatever the header says.
+    #[cold]
+    fn start_any_data(&mut self, header: &Header, len: usize) -> Result<(u8, Range<usize>), TelegramError> {
         let saps = header.sap_octets();
         let most = MAX_DU - saps;
         if len > most {
@@ -475,7 +491,7 @@ impl Frame {
             at += 1;
         }
         self.len = (at + len + TAIL) as u8;
-        Ok((fcs, &mut self.octets[at..at + len]))
+        Ok((fcs, at..at + len))
     }
     /// Writes FCS and ED behind the data unit.
     fn finish_data(&mut self, fcs: u8) {

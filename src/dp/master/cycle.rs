@@ -111,7 +111,7 @@ impl<A: Application> Master<A> {
         match self.settings.pace {
             Pace::Free { .. } => self.visit(now, out),
             Pace::Synch if self.is_alone() => self.spare(now, out),
-            Pace::Synch => self.take(now, out),
+            Pace::Synch => self.hold(now, out),
         }
     }
     /// A cycle begins at `now`. Returns its number and where it was aimed at.
@@ -160,10 +160,10 @@ impl<A: Application> Master<A> {
         if self.settings.active_spare && self.fits(t_tr) {
             return self.pass_on(out);
         }
-        self.take(now, out);
+        self.hold(now, out);
     }
     /// Holds a token that another station has passed: it listens for T_SL whether the token is taken.
-    fn take(&mut self, now: Local, out: &mut Outbox) {
+    fn hold(&mut self, now: Local, out: &mut Outbox) {
         let answer = self.t_sl() - self.active.t_id1();
         if self.clock.planned() - now > answer { self.be_heard(now, out) } else { self.await_synch(now, out) }
     }
@@ -245,9 +245,12 @@ impl<A: Application> Master<A> {
     /// Whether T_TH is over before Data_Exchange with `slave`, or the slave may not be asked again for longer than T_SL,
     /// because the token was away between it and those before it: then the token goes on, and later so does the cycle.
     pub(super) fn stops_before(&mut self, slave: usize, now: Local, out: &mut Outbox) -> bool {
+        if !self.is_free() || self.is_alone() {
+            return false;
+        }
         let at = self.active.free_at().max(now);
         let too_early = self.handlers[slave].earliest().is_some_and(|earliest| earliest > at + self.t_sl());
-        let stops = self.is_free() && !self.is_alone() && (too_early || !self.active.may_high(at));
+        let stops = too_early || !self.active.may_high(at);
         if stops {
             self.polling.stopped_at = Some(slave);
             self.token(out);

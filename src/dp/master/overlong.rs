@@ -82,8 +82,8 @@ impl<A: Application> Master<A> {
     pub(super) fn next_job(&mut self, now: Local) {
         let asked = self.app.acyclic();
         self.overload.own = asked.is_none();
-        if let Some(job) = asked.or(self.overload.job) {
-            self.ms1.begin(now, job, self.handlers[job.slave].params().ms1_timeout);
+        if let Some(job) = asked.as_ref().or(self.overload.job.as_ref()) {
+            self.ms1.begin(now, *job, self.handlers[job.slave].params().ms1_timeout);
         }
     }
     /// The ordinary message of the cycle is over: the ordered one, unless it was that; then the GAP.

@@ -230,31 +230,37 @@ impl Active {
 
     /// What was heard while this station has the token: none if nothing speaks against that. PS repeats the token
     /// when it has not heard this station yet.
+    #[inline]
     pub(super) fn disputed(
         &mut self,
         now: Local,
         telegram: Option<&Telegram<'_>>,
         out: &mut Outbox,
     ) -> Option<Confirm<'static>> {
-        let (sa, da) = match telegram? {
-            Telegram::Token { da, sa } => (*sa, *da),
-            Telegram::Data { header, .. } if matches!(header.fc, FrameControl::Request { .. }) => {
-                (header.sa, header.da)
+        match telegram? {
+            Telegram::Token { da, sa } => Some(self.another_speaks(now, *sa, *da == self.address, out)),
+            Telegram::Data { header, .. }
+                if matches!(header.fc, FrameControl::Request { .. }) || header.sa == self.address =>
+            {
+                Some(self.another_speaks(now, header.sa, false, out))
             }
-            Telegram::Data { header, .. } if header.sa == self.address => (header.sa, header.da),
-            Telegram::Data { .. } | Telegram::ShortAck => return None,
-        };
+            Telegram::Data { .. } | Telegram::ShortAck => None,
+        }
+    }
+    /// `sa` speaks as if it had the token, or gives it to this station.
+    #[cold]
+    fn another_speaks(&mut self, now: Local, sa: Address, gives: bool, out: &mut Outbox) -> Confirm<'static> {
         if sa == self.address {
             self.leaves(now, RingExit::AddressConflict, out);
-            return Some(Confirm::TokenGone);
+            return Confirm::TokenGone;
         }
-        if matches!(telegram, Some(Telegram::Token { .. })) && da == self.address {
-            return Some(Confirm::Nothing);
+        if gives {
+            return Confirm::Nothing;
         }
         out.observe(Observation::TokenDropped { why: RingExit::SecondToken });
         self.await_silence(now, out);
         self.state = State::ActiveIdle { skipped: 0 };
-        Some(Confirm::TokenGone)
+        Confirm::TokenGone
     }
     /// Leaves the ring: from here on as after power on.
     fn leaves(&mut self, now: Local, why: RingExit, out: &mut Outbox) -> Confirm<'static> {
