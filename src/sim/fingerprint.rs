@@ -12,7 +12,7 @@ use twox_hash::XxHash64;
 use super::record::{Recorder, Stamp, Transmission};
 use crate::observation::{Disturbance, Observation};
 use crate::time::Time;
-use crate::wire::Address;
+use crate::wire::{Address, MAX_FRAME};
 
 /// Most checkpoints kept; with more, every second one is dropped.
 const CHECKPOINTS: usize = 64;
@@ -66,19 +66,50 @@ impl fmt::Display for Fingerprint {
     }
 }
 
+/// Octets of an instant.
+const INSTANT: usize = size_of::<i64>();
+
+/// The latest telegram of a station, which may still be withdrawn: its first bit's instant, then its octets.
+#[derive(Clone)]
+struct Latest {
+    start: Time,
+    octets: [u8; INSTANT + MAX_FRAME],
+    /// 0 if there is none.
+    length: usize,
+}
+
+impl Default for Latest {
+    fn default() -> Self {
+        Self { start: Time::ZERO, octets: [0; INSTANT + MAX_FRAME], length: 0 }
+    }
+}
+impl Latest {
+    fn set(&mut self, start: Time, octets: &[u8]) {
+        self.start = start;
+        self.length = INSTANT + octets.len();
+        self.octets[..INSTANT].copy_from_slice(&start.ticks().to_le_bytes());
+        self.octets[INSTANT..self.length].copy_from_slice(octets);
+    }
+    fn octets(&self) -> &[u8] {
+        &self.octets[..self.length]
+    }
+}
+
 #[derive(Clone, Default)]
 struct Station {
+    /// All telegrams but the latest.
     wire: Digest,
-    /// The first bit of the latest telegram, and what there was before it: it may be withdrawn. A station gives no other
-    /// telegram to the line before this one has left.
-    latest: Option<(Time, Digest)>,
+    /// A station gives no other telegram to the line before this one has left.
+    latest: Latest,
     states: Digest,
     latches: Digest,
 }
 
 impl Station {
     fn fingerprint(&self) -> Fingerprint {
-        Fingerprint { wire: self.wire.value(), states: self.states.value(), latches: self.latches.value() }
+        let mut wire = self.wire.clone();
+        wire.octets(self.latest.octets());
+        Fingerprint { wire: wire.value(), states: self.states.value(), latches: self.latches.value() }
     }
 }
 
@@ -142,14 +173,14 @@ impl Fingerprints {
 impl Recorder for Fingerprints {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
         let Station { wire, latest, .. } = self.station(telegram.sender);
-        *latest = Some((telegram.start, wire.clone()));
-        wire.instant(telegram.start);
-        wire.octets(telegram.octets);
+        wire.octets(latest.octets());
+        latest.set(telegram.start, telegram.octets);
     }
     fn withdrawn(&mut self, sender: Address, now: Time) {
-        let Some(Station { wire, latest, .. }) = &mut self.stations[usize::from(sender.get())] else { return };
-        if let Some((_, before)) = latest.take_if(|(start, _)| *start > now) {
-            *wire = before;
+        if let Some(Station { latest, .. }) = &mut self.stations[usize::from(sender.get())]
+            && latest.start > now
+        {
+            latest.length = 0;
         }
     }
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
@@ -159,11 +190,13 @@ impl Recorder for Fingerprints {
             Observation::CycleStart { .. }
             | Observation::Disturbed { how: Disturbance::Begins | Disturbance::Ends, .. } => {}
             Observation::Latch { locked, inputs } => {
-                let latches = &mut self.station(stamp.station).latches;
-                latches.instant(stamp.at);
-                latches.octets(&[u8::from(*locked)]);
-                latches.octets(&inputs.xist1.to_le_bytes());
-                latches.octets(&inputs.xist2.to_le_bytes());
+                // One piece: a hash takes longer to be told something than to add it.
+                let mut octets = [0; INSTANT + 9];
+                octets[..INSTANT].copy_from_slice(&stamp.at.ticks().to_le_bytes());
+                octets[INSTANT] = u8::from(*locked);
+                octets[INSTANT + 1..][..4].copy_from_slice(&inputs.xist1.to_le_bytes());
+                octets[INSTANT + 5..].copy_from_slice(&inputs.xist2.to_le_bytes());
+                self.station(stamp.station).latches.octets(&octets);
             }
             event if event.is_event() => {
                 let states = &mut self.station(stamp.station).states;

@@ -126,12 +126,27 @@ impl Cycle {
     }
 }
 
+/// Cycles at the beginning that are all looked at.
+const FIRST: u64 = 512;
+/// From then on so many in a row are looked at, [`ROW`] out of [`PERIOD`]: a GAP poll is among them, and a long run does not
+/// read each of its telegrams once more.
+const ROW: u64 = 64;
+/// See [`ROW`].
+const PERIOD: u64 = 4_096;
+
+const fn is_looked_at(cycle: u64) -> bool {
+    cycle < FIRST || cycle % PERIOD < ROW
+}
+
 /// Keeps the telegrams, T_O and latch instants of the latest complete cycle of one master with data exchange, requests of
-/// other masters and a GAP poll; else of the latest that has most of these, in this order.
+/// other masters and a GAP poll; else of the latest that has most of these, in this order. Not all cycles of a long run are
+/// looked at.
 #[derive(Clone, Debug)]
 pub struct BusCycle {
     /// Whose cycles.
     master: Address,
+    /// Whether this cycle is looked at.
+    looks: bool,
     current: Cycle,
     kept: Cycle,
     /// What the last request was for, and for whom.
@@ -146,12 +161,26 @@ impl BusCycle {
     /// Nothing kept yet of the cycles of `master`.
     pub fn new(master: Address) -> Self {
         let asked = (Kind::Unreadable, None);
-        Self { master, current: Cycle::new(), kept: Cycle::new(), asked, other: None, coming: None }
+        Self { master, looks: true, current: Cycle::new(), kept: Cycle::new(), asked, other: None, coming: None }
     }
 
     /// The kept cycle.
     pub(super) fn cycle(&self) -> Option<&Cycle> {
         self.kept.next.map(|_| &self.kept)
+    }
+
+    /// A cycle begins at `t0`, which is the end of the one before. What was not seen from its beginning is not kept: the
+    /// first cycle of a row is listened to only, for who asks whom.
+    fn begin(&mut self, cycle: u64, t0: Time) {
+        let looked = core::mem::replace(&mut self.looks, is_looked_at(cycle));
+        // Without its SYNCH on the line the cycle begins all the same.
+        let synch = self.coming.take();
+        if !looked {
+            return self.current.clear();
+        }
+        self.next(synch.map_or(t0, |synch| synch.start), t0);
+        self.current.bars.extend(synch);
+        self.current.number = Some(cycle);
     }
 
     /// The current cycle ends with the first bit of the next SYNCH at `start`, the next one begins at `t0`.
@@ -199,6 +228,9 @@ fn request(header: &Header, service: Service, du: &[u8]) -> Kind {
 
 impl Recorder for BusCycle {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
+        if !self.looks {
+            return;
+        }
         let (kind, asks, slave) = self.classify(telegram);
         if asks {
             self.other = (telegram.sender != self.master).then_some(telegram.sender);
@@ -216,15 +248,8 @@ impl Recorder for BusCycle {
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
         let station = usize::from(stamp.station.get()).min(STATIONS - 1);
         match what {
-            Observation::CycleStart { cycle, .. } if stamp.station == self.master => {
-                // Without its SYNCH on the line the cycle begins all the same.
-                let synch = self.coming.take();
-                self.next(synch.map_or(stamp.at, |synch| synch.start), stamp.at);
-                if let Some(synch) = synch {
-                    self.current.push(synch);
-                }
-                self.current.number = Some(*cycle);
-            }
+            Observation::CycleStart { cycle, .. } if stamp.station == self.master => self.begin(*cycle, stamp.at),
+            _ if !self.looks => {}
             Observation::SetPoint { .. } => self.current.t_o[station] = Some(stamp.at),
             Observation::Latch { locked, .. } => self.current.latch[station] = Some((stamp.at, *locked)),
             _ => {}

@@ -570,6 +570,22 @@ fn the_kept_bus_cycle_has_a_gap_poll_if_one_was_complete() {
 }
 
 #[test]
+fn of_a_long_run_rows_of_cycles_are_looked_at_and_the_last_of_them_is_kept() {
+    let t_dp = Span::from_ms(2);
+    let mut world = World::new(2, 1, t_dp);
+    for (last, kept) in [(300, 299), (511, 510), (4_096, 511), (4_097, 511), (4_100, 4_099), (5_000, 4_159)] {
+        let next = world.bus.cycle().and_then(|cycle| cycle.number).map_or(0, |number| number + 2);
+        for cycle in next..=last {
+            world.bus_cycle(cycle, t_dp);
+        }
+        let cycle = world.bus.cycle().unwrap();
+        assert_eq!(cycle.number, Some(kept), "cycles up to {last}");
+        assert_eq!(cycle.bars.iter().filter(|bar| bar.kind == telegrams::Kind::Synch).count(), 1);
+        assert_eq!(cycle.bars.iter().filter(|bar| bar.kind == telegrams::Kind::Request).count(), 2);
+    }
+}
+
+#[test]
 fn every_file_of_this_folder_is_registered_or_serves_the_others() {
     const SERVING: [&str; 13] = [
         "mod",
