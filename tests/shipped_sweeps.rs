@@ -50,7 +50,8 @@ fn shipped_sweeps_are_all_looked_at_and_say_what_they_ask() {
         names,
         ["encoders.toml", "frame-loss.toml", "jitter-tolerance.toml", "jitter-window.toml", "pll-gains.toml"]
     );
-    for (name, text) in files {
+    for (name, octets) in files {
+        let text = String::from_utf8(octets).expect("a text");
         let starts: Vec<_> = ["# Question: ", "# Expected: ", "# Source: "].map(|word| text.find(word)).into();
         assert!(starts.is_sorted() && starts[0].is_some(), "{}: Question, Expected, Source", name.display());
     }

@@ -42,16 +42,17 @@ fn room() -> Room {
 }
 
 /// Every file below, with what it holds.
-pub(crate) fn files(dir: &Path) -> BTreeMap<PathBuf, String> {
+pub(crate) fn files(dir: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(dir).unwrap_or_else(|error| panic!("{}: {error}", dir.display())) {
         let path = entry.expect("an entry").path();
         if path.is_dir() {
             let below = files(&path);
-            found.extend(below.into_iter().map(|(name, text)| (Path::new(path.file_name().unwrap()).join(name), text)));
+            let inside = |name| Path::new(path.file_name().unwrap()).join(name);
+            found.extend(below.into_iter().map(|(name, octets)| (inside(name), octets)));
         } else {
             let name = PathBuf::from(path.file_name().expect("a name"));
-            found.insert(name, fs::read_to_string(&path).expect("a text"));
+            found.insert(name, fs::read(&path).expect("a file"));
         }
     }
     found
@@ -189,7 +190,7 @@ fn results_are_the_same_for_any_number_of_threads() {
         room.runs(&["sweep", "jitter.toml", "--threads", threads, "--out", threads]);
     }
     let of = |threads| files(&room.path(threads));
-    let expected = 5 + 3 * 5 + 3 * 2;
+    let expected = 5 + usize::from(cfg!(feature = "parquet")) + 3 * 5 + 3 * 2;
     assert_eq!(of("1").len(), expected, "plan, journal, lock, two tables; pictures of five figures; two pools");
     assert_eq!(of("1"), of("2"));
     assert_eq!(of("1"), of("4"));
@@ -311,7 +312,7 @@ fn begin_and_do(room: &Room, runs: usize) -> Child {
 }
 
 /// The results of the whole sweep, undisturbed and after what was begun in `room`.
-fn both(room: &Room) -> [BTreeMap<PathBuf, String>; 2] {
+fn both(room: &Room) -> [BTreeMap<PathBuf, Vec<u8>>; 2] {
     assert!(!room.path("out/jitter/results.csv").exists(), "it was over before it was disturbed");
     let page = room.runs(&["sweep", "jitter.toml"]);
     assert!(!page.contains(", 0 before"), "{page}");

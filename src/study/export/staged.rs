@@ -116,7 +116,7 @@ impl Staged {
 
     /// A file that says no to every octet.
     #[cfg(all(test, target_os = "linux"))]
-    pub(super) fn full(dir: &Path, name: &str) -> Self {
+    pub(in crate::study) fn full(dir: &Path, name: &str) -> Self {
         let mut staged = Self::create(dir, name).unwrap();
         *staged.file.as_file_mut() = fs::File::options().write(true).open("/dev/full").unwrap();
         staged

@@ -224,7 +224,8 @@ fn conclude(plan: &Plan, store: &Store) -> Result<page::Concluded, SweepError> {
         }
     }
     let worst = pooling.worst();
-    let mut files = vec![results.finish()?, summary.finish()?];
+    let mut files = results.finish()?;
+    files.push(summary.finish()?);
     files.extend(pooling.finish()?);
     for (name, text) in gallery.draw()? {
         let mut file = Staged::create(store.dir(), &name)?;

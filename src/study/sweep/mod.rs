@@ -13,16 +13,20 @@
 mod ascending;
 mod attempt;
 pub mod axis;
+pub mod cell;
 pub mod combination;
 pub mod command;
 pub mod crew;
 pub mod definition;
+mod format;
 mod index;
 pub mod journal;
 pub mod key;
 pub mod merge;
 mod page;
 pub mod parameter;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod picture;
 pub mod plan;
 mod pooled;

@@ -1,6 +1,7 @@
 //! Parameter: the columns of tables that tell of which combination a row is.
 
 use super::axis::{Axis, plain};
+use super::cell::{Cell, Heading, Kind};
 use super::definition::Definition;
 use crate::study::plot::sweep::Parameter;
 use crate::study::quantity::Measure;
@@ -8,8 +9,8 @@ use crate::study::quantity::Measure;
 /// A column of tables.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Column {
-    /// Its name, with the unit if it has one: `master_t_dp_ms`.
-    pub name: String,
+    /// Its name, with the unit if it has one, `master_t_dp_ms`, and what all values are.
+    pub heading: Heading,
     /// Number of the axis.
     axis: usize,
     /// Number of the key among the axis' keys; none for its labels.
@@ -40,14 +41,17 @@ impl Column {
         definition.axes.iter().enumerate().flat_map(of_axis).collect()
     }
     fn new(name: &str, number: usize, key: Option<usize>, axis: &Axis) -> Self {
-        let mut column = Self { name: String::new(), axis: number, key, unit: None };
+        let heading = Heading { name: String::new(), kind: Kind::Text };
+        let mut column = Self { heading, axis: number, key, unit: None };
         let first = Measure::read(column.text(axis, 0)).filter(|first| !first.unit.is_empty());
         let fits = |first: &Measure| {
             let all = (0..axis.len()).map(|value| Measure::read(column.text(axis, value)));
             all.into_iter().all(|value| value.is_some_and(|value| value.is_like(*first)))
         };
         column.unit = first.filter(fits);
-        column.name = named(name, column.unit.map_or("", |unit| unit.unit));
+        let texts = (0..axis.len()).map(|value| column.text(axis, value));
+        let kind = column.unit.map_or_else(|| Kind::of(&texts), |_| Kind::Number);
+        column.heading = Heading { name: named(name, column.unit.map_or("", |unit| unit.unit)), kind };
         column
     }
     fn text<'a>(&self, axis: &'a Axis, value: usize) -> &'a str {
@@ -65,11 +69,13 @@ impl Column {
         Parameter { name: format!("{}{unit}", of.name), labels, numbers }
     }
     /// What stands in the column for these numbers of the axes' values.
-    pub fn cell(&self, axes: &[Axis], values: &[usize]) -> String {
+    pub fn cell(&self, axes: &[Axis], values: &[usize]) -> Cell {
         let text = self.text(&axes[self.axis], values[self.axis]);
         match self.unit.and_then(|unit| Some((Measure::read(text)?, unit))) {
-            Some((value, unit)) => value.decimal_in(unit).unwrap_or_else(|| value.value_in(unit).to_string()),
-            None => text.to_owned(),
+            Some((value, unit)) => {
+                Cell::Number(value.decimal_in(unit).unwrap_or_else(|| value.value_in(unit).to_string()))
+            }
+            None => self.heading.kind.read(text).unwrap_or_else(|| Cell::text(text)),
         }
     }
 }

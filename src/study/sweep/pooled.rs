@@ -9,9 +9,10 @@
 
 use std::path::Path;
 
+use super::cell::Cell;
 use super::parameter::Column;
 use super::plan::{Job, Plan};
-use super::results::{Table, cell};
+use super::results::Table;
 use super::row::Row;
 use super::store::StoreError;
 use crate::study::export::Staged;
@@ -47,7 +48,7 @@ struct Tables {
 impl Tables {
     fn create(dir: &Path, pooled: &Pooled, columns: &[Column]) -> Result<Self, StoreError> {
         let (unit, name) = (Unit::from(pooled.quantity().unit), file_name(pooled));
-        let parameters = || columns.iter().map(|column| column.name.clone());
+        let parameters = || columns.iter().map(|column| column.heading.name.clone());
         let time = |name: &str| format!("{name}{}", unit.suffix());
         let mut values = Table::create(dir, &format!("pooled_{name}.csv"))?;
         let quantiles = QUANTILES.iter().map(|&(name, _)| time(name));
@@ -60,7 +61,7 @@ impl Tables {
     }
     fn add(&mut self, parameters: &[String], row: &Row<'_>, pool: &Pool) -> Result<(), StoreError> {
         let (unit, all) = (self.unit, pool.values());
-        let time = |ticks: i64| cell(Value::Span(Span::from_ticks(ticks)), unit);
+        let time = |ticks: i64| Cell::of(Value::Span(Span::from_ticks(ticks)), unit).to_string();
         let number = |ticks: Option<f64>| ticks.map_or_else(String::new, |ticks| unit.of_grains(ticks).to_string());
         let extreme = |extreme: Option<Extreme>| match extreme {
             Some(Extreme { value, at }) => [time(value), at.run.to_string(), at.cycle.to_string()],
@@ -123,7 +124,8 @@ impl<'a> Pooling<'a> {
     pub(super) fn add(&mut self, row: &Row<'_>) -> Result<(), StoreError> {
         let definition = &self.plan.definition;
         let values = definition.combinations().values(row.combination);
-        let parameters: Vec<_> = self.columns.iter().map(|column| column.cell(&definition.axes, &values)).collect();
+        let parameters: Vec<_> =
+            self.columns.iter().map(|column| column.cell(&definition.axes, &values).to_string()).collect();
         self.all.iter_mut().zip(&row.pools).try_for_each(|(tables, pool)| tables.add(&parameters, row, pool))
     }
     /// Where each quantity was farthest from zero, as far as it had a value.

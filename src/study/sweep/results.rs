@@ -7,52 +7,46 @@
 //! | `failed` | has none: it broke off |
 //!
 //! Rows are in the order of the plan, whoever finished when, and are read from the journal one by one: the table is as
-//! long as it needs to be and the memory is not.
+//! long as it needs to be and the memory is not. It is written in every [format](super::format) at once, with the same
+//! columns.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use csv::Writer;
 
+use super::cell::{Cell, Heading, Kind};
 use super::definition::Definition;
+use super::format::{self, Rows, Sheet};
 use super::journal::Record;
 use super::parameter::Column;
 use super::plan::{Job, Plan};
 use super::store::StoreError;
-use crate::study::export::decimal::Decimal;
 use crate::study::export::{ExportError, Staged};
-use crate::study::figure::{Figure, Unit, Value};
 
-/// File of the rows.
-const FILE: &str = "results.csv";
-
-/// The table, under its temporary name.
+/// The files of the table, under their temporary names.
 pub(super) struct Results<'a> {
     plan: &'a Plan,
     columns: Vec<Column>,
-    table: Table,
+    files: Vec<Sheet>,
     /// The combination of the last row and its cells.
-    last: Option<(u64, Vec<String>)>,
+    last: Option<(u64, Vec<Cell>)>,
 }
 
 impl<'a> Results<'a> {
     /// Begins it in `dir`.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// A file cannot be written.
     pub(super) fn create(dir: &Path, plan: &'a Plan) -> Result<Self, StoreError> {
-        let mut table = Table::create(dir, FILE)?;
         let columns = Column::of(&plan.definition);
-        let names = columns.iter().map(|column| column.name.clone());
-        let figures = plan.definition.figures.iter().map(Figure::column);
-        let fixed = ["repetition", "seed", "status"].map(str::to_owned);
-        table.row(names.chain(fixed).chain(figures).chain(["run".to_owned()]))?;
-        Ok(Self { plan, columns, table, last: None })
+        let files = format::open(dir, &headings(&plan.definition, &columns))?;
+        Ok(Self { plan, columns, files, last: None })
     }
     /// Writes the row of a run.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// A file cannot be written.
     pub(super) fn add(&mut self, job: Job, record: &Record) -> Result<(), StoreError> {
         let definition = &self.plan.definition;
         let cells = match self.last.take() {
@@ -62,40 +56,38 @@ impl<'a> Results<'a> {
                 self.columns.iter().map(|column| column.cell(&definition.axes, &values)).collect()
             }
         };
-        self.table.row(cells.iter().cloned().chain(row(definition, job, record)))?;
+        let row: Vec<_> = cells.iter().cloned().chain(row(definition, job, record)).collect();
+        self.files.iter_mut().try_for_each(|file| file.row(&row))?;
         self.last = Some((job.combination, cells));
         Ok(())
     }
-    /// The whole file.
+    /// The whole files.
     ///
     /// # Errors
-    /// It cannot be written.
-    pub(super) fn finish(self) -> Result<Staged, StoreError> {
-        self.table.finish()
+    /// One cannot be written.
+    pub(super) fn finish(self) -> Result<Vec<Staged>, StoreError> {
+        self.files.into_iter().map(Rows::finish).collect()
     }
 }
 
-fn row(definition: &Definition, job: Job, record: &Record) -> Vec<String> {
-    let mut row = vec![job.repetition.to_string(), job.seed.to_string(), record.status().to_owned()];
+/// The columns of the table: what the combination is, which run, what became of it.
+fn headings(definition: &Definition, columns: &[Column]) -> Vec<Heading> {
+    let fixed = [("repetition", Kind::Whole), ("seed", Kind::Natural), ("status", Kind::Text)];
+    let figures = definition.figures.iter().map(|figure| (figure.column(), Kind::from(figure.unit())));
+    let run = (fixed.into_iter().map(|(name, kind)| (name.to_owned(), kind))).chain(figures);
+    let run = run.chain([("run".to_owned(), Kind::Text)]).map(|(name, kind)| Heading { name, kind });
+    columns.iter().map(|column| column.heading.clone()).chain(run).collect()
+}
+
+/// What stands below [`headings`] behind the combination's cells.
+fn row(definition: &Definition, job: Job, record: &Record) -> Vec<Cell> {
+    let mut row = vec![Cell::Whole(job.repetition.into()), Cell::Whole(job.seed.into()), Cell::text(record.status())];
     for figure in &definition.figures {
         let value = record.figures.get(figure.name()).copied().flatten();
-        row.push(value.map_or_else(String::new, |value| cell(value, figure.unit())));
+        row.push(value.map_or(Cell::Nothing, |value| Cell::of(value, figure.unit())));
     }
-    row.push(job.key.to_string());
+    row.push(Cell::text(job.key.to_string()));
     row
-}
-
-/// A value in a table: exact to the picosecond where it is a time.
-pub(super) fn cell(value: Value, unit: Unit) -> String {
-    match (value, unit) {
-        (Value::Span(span), Unit::Us) => Decimal::us(span).to_string(),
-        (Value::Span(span), Unit::Ms) => Decimal::ms(span).to_string(),
-        (Value::Span(span), Unit::S) => Decimal::s(span).to_string(),
-        (Value::Span(span), _) => Decimal::ns(span).to_string(),
-        (Value::Count(count), _) => count.to_string(),
-        (Value::Truth(truth), _) => truth.to_string(),
-        (Value::Steps(_) | Value::Share(_), _) => value.number(unit).to_string(),
-    }
 }
 
 /// A CSV file under its temporary name.
@@ -106,7 +98,11 @@ pub(in crate::study) struct Table {
 
 impl Table {
     pub(in crate::study) fn create(dir: &Path, name: &str) -> Result<Self, StoreError> {
-        Ok(Self { writer: Writer::from_writer(Staged::create(dir, name)?), path: dir.join(name) })
+        Ok(Self::of(Staged::create(dir, name)?))
+    }
+    pub(super) fn of(file: Staged) -> Self {
+        let path = file.path().to_owned();
+        Self { writer: Writer::from_writer(file), path }
     }
     pub(in crate::study) fn row(&mut self, cells: impl Iterator<Item = String>) -> Result<(), StoreError> {
         let written = self.writer.write_record(cells);

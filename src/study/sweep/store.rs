@@ -4,6 +4,7 @@
 //! out/<sweep>/plan.json            the sweep file's text and what becomes of every combination
 //! out/<sweep>/runs/journal.jsonl   a line per finished run
 //! out/<sweep>/results.csv          when all runs are done: a row per run
+//! out/<sweep>/results.parquet      the same, if isodp was built with the feature parquet
 //! out/<sweep>/summary.csv          a row per combination
 //! out/<sweep>/*.svg                figures against parameters, over two of them, and how they are distributed
 //! ```

@@ -11,9 +11,10 @@
 
 use std::path::Path;
 
+use super::cell::Cell;
 use super::parameter::Column;
 use super::plan::Plan;
-use super::results::{Table, cell};
+use super::results::Table;
 use super::row::Row;
 use super::sample::Sample;
 use super::store::StoreError;
@@ -58,7 +59,7 @@ fn number(number: Option<f64>) -> Option<String> {
     number.map(|number| number.to_string())
 }
 fn value(sample: &Sample<'_>, value: Option<Value>) -> Option<String> {
-    value.map(|value| cell(value, sample.figure().unit()))
+    value.map(|value| Cell::of(value, sample.figure().unit()).to_string())
 }
 /// The statistics that are told of this figure.
 fn told(figure: &Figure) -> impl Iterator<Item = &'static Statistic> {
@@ -81,7 +82,7 @@ impl<'a> Summary<'a> {
     pub(super) fn create(dir: &Path, plan: &'a Plan) -> Result<Self, StoreError> {
         let mut table = Table::create(dir, FILE)?;
         let columns = Column::of(&plan.definition);
-        let names = columns.iter().map(|column| column.name.clone());
+        let names = columns.iter().map(|column| column.heading.name.clone());
         let names = names.chain(["runs", "failed", "broken"].map(str::to_owned));
         let of_figure = |figure: &Figure| {
             let column = figure.column();
@@ -99,7 +100,7 @@ impl<'a> Summary<'a> {
     pub(super) fn add(&mut self, row: &Row<'_>) -> Result<(), StoreError> {
         let definition = &self.plan.definition;
         let values = definition.combinations().values(row.combination);
-        let cells = self.columns.iter().map(|column| column.cell(&definition.axes, &values));
+        let cells = self.columns.iter().map(|column| column.cell(&definition.axes, &values).to_string());
         let cells = cells.chain([row.runs, row.failed, row.broken].map(|count| count.to_string()));
         let of_sample = |sample: &Sample<'_>| {
             let cell = |statistic: &Statistic| (statistic.of)(sample).unwrap_or_default();
