@@ -121,6 +121,21 @@ fn a_row_says_what_a_run_of_its_parameters_says() {
 }
 
 #[test]
+fn what_a_sweep_is_not_asked_any_more_it_does_not_leave() {
+    let room = room();
+    room.runs(&["sweep", "jitter.toml"]);
+    let has = |file: &str| room.path("out/jitter").join(file).exists();
+    let files = ["tail_latch_skew.svg", "pooled_latch_skew.csv", "pooled_latch_skew_bins.csv", "curve_faults.svg"];
+    assert!(files.iter().all(|file| has(file)));
+    room.write("out/jitter/curve of mine.txt", "kept");
+    room.write("jitter.toml", SWEEP.replacen("\"latch_skew\", ", "", 1).replacen("\"faults\", ", "", 1));
+    let page = room.runs(&["sweep", "jitter.toml"]);
+    assert!(page.contains("\n0 runs done now, 12 before, 0 failed\n"), "{page}");
+    assert!(!files.iter().any(|file| has(file)));
+    assert!(has("curve of mine.txt") && has("results.csv") && has("tail_slave_4_pll_error.svg"));
+}
+
+#[test]
 fn a_pool_has_every_value_of_every_repetition_and_knows_where_the_largest_was() {
     let room = room();
     let page = room.runs(&["sweep", "jitter.toml"]);

@@ -1,5 +1,6 @@
 //! The commands `isodp sweep` and `isodp merge`.
 
+use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,7 +19,7 @@ use super::store::{Store, StoreError};
 use super::summary::{NeverSeen, Summary};
 use super::worker::Worker;
 use super::{crew, merge, page};
-use crate::study::export::{ExportError, Staged};
+use crate::study::export::{ExportError, Staged, clear};
 use crate::study::scenario::ScenarioError;
 
 /// What `isodp sweep` was called with.
@@ -203,6 +204,21 @@ fn failures(plan: &Plan, shard: Shard, store: &Store) -> Result<Failures, SweepE
     Ok(failures)
 }
 
+/// Files in `dir` with names of this tool, which an earlier call may have left: with other figures, or in other formats.
+fn left_by_others(dir: &Path) -> impl Iterator<Item = String> {
+    const NAMES: [(&str, &str); 6] = [
+        ("results.", ""),
+        ("pooled_", ".csv"),
+        ("curve_", ".svg"),
+        ("heat_", ".svg"),
+        ("cumulative_", ".svg"),
+        ("tail_", ".svg"),
+    ];
+    let all = fs::read_dir(dir).into_iter().flatten().flatten();
+    let names = all.filter_map(|entry| entry.file_name().into_string().ok());
+    names.filter(|name| NAMES.iter().any(|(begin, end)| name.starts_with(begin) && name.ends_with(end)))
+}
+
 /// Writes the tables and the pictures.
 fn conclude(plan: &Plan, store: &Store) -> Result<page::Concluded, SweepError> {
     let mut results = Results::create(store.dir(), plan)?;
@@ -233,6 +249,7 @@ fn conclude(plan: &Plan, store: &Store) -> Result<page::Concluded, SweepError> {
         files.push(file);
     }
     let placed = Staged::place_all(files)?;
+    clear(store.dir(), left_by_others(store.dir()), &placed)?;
     let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
     Ok(page::Concluded { files: placed.iter().filter_map(name).collect(), never: never.told(), worst })
 }
