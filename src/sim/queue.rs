@@ -83,17 +83,20 @@ impl fmt::Debug for Key {
 pub trait Queue<E: Copy>: Default {
     /// Adds an event.
     fn push(&mut self, key: Key, event: E);
+    /// The first event's key.
+    fn peek(&mut self) -> Option<Key>;
     /// Takes the first event out.
     ///
     /// # Panics
-    /// If it is earlier than the one before: somebody pushed an event into the past.
-    fn pop(&mut self) -> Option<(Key, E)>;
-    /// The same if it comes before `bound`.
-    fn pop_before(&mut self, bound: Time) -> Option<(Key, E)> {
-        if self.peek().is_some_and(|key| key.time() < bound) { self.pop() } else { None }
+    /// If no event waits, or it is earlier than the one before: somebody pushed an event into the past.
+    fn take(&mut self) -> (Key, E);
+    /// Takes the first event out if there is one.
+    ///
+    /// # Panics
+    /// As [`take`](Self::take).
+    fn pop(&mut self) -> Option<(Key, E)> {
+        self.peek().map(|_| self.take())
     }
-    /// The first event's key.
-    fn peek(&mut self) -> Option<Key>;
     /// How many events wait.
     fn len(&self) -> usize;
     /// Whether no event waits.
@@ -162,13 +165,13 @@ impl<E: Copy> Queue<E> for HeapQueue<E> {
     fn push(&mut self, key: Key, event: E) {
         self.heap.push(Waiting { key, event });
     }
-    fn pop(&mut self) -> Option<(Key, E)> {
-        let Waiting { key, event } = self.heap.pop()?;
-        self.watch.pass(key);
-        Some((key, event))
-    }
     fn peek(&mut self) -> Option<Key> {
         self.heap.peek().map(|waiting| waiting.key)
+    }
+    fn take(&mut self) -> (Key, E) {
+        let Waiting { key, event } = self.heap.pop().expect("an event waits");
+        self.watch.pass(key);
+        (key, event)
     }
     fn len(&self) -> usize {
         self.heap.len()
@@ -281,8 +284,13 @@ impl<E: Copy> NearQueue<E> {
         } else if day - self.date < YEAR as i64 {
             self.note(key, event);
         } else {
-            self.later.push(Waiting { key, event });
+            self.put_later(key, event);
         }
+    }
+    /// The same beyond the year.
+    #[cold]
+    fn put_later(&mut self, key: Key, event: E) {
+        self.later.push(Waiting { key, event });
     }
     /// From now on there are days and pages.
     #[cold]
@@ -295,6 +303,7 @@ impl<E: Copy> NearQueue<E> {
         }
         self.today.drain(..later);
     }
+    #[inline(never)]
     fn insert(&mut self, key: Key, event: E) {
         let len = self.today.len();
         let mut place = len;
@@ -312,18 +321,20 @@ impl<E: Copy> NearQueue<E> {
     fn note(&mut self, key: Key, event: E) {
         let page = page(day(key));
         let note = Note { key, event, next: self.pages[page] };
-        let id = if let Some(id) = self.blank {
-            let blank = &mut self.notes[id.get() as usize - 1];
-            self.blank = blank.next;
-            *blank = note;
-            id
-        } else {
-            self.notes.push(note);
-            NoteId::new(self.notes.len() as u32).expect("not zero after a push")
-        };
+        let id = if let Some(id) = self.blank { id } else { self.add_blank(note) };
+        let blank = &mut self.notes[id.get() as usize - 1];
+        self.blank = blank.next;
+        *blank = note;
         self.pages[page] = Some(id);
         self.marked |= 1 << page;
         self.noted += 1;
+    }
+
+    /// Room for one more note.
+    #[cold]
+    fn add_blank(&mut self, note: Note<E>) -> NoteId {
+        self.notes.push(Note { next: None, ..note });
+        NoteId::new(self.notes.len() as u32).expect("not zero after a push")
     }
 
     /// The next day with a note.
@@ -373,28 +384,22 @@ impl<E: Copy> Queue<E> for NearQueue<E> {
             self.put(key, event);
         }
     }
-    fn pop(&mut self) -> Option<(Key, E)> {
-        if self.today.is_empty() {
-            self.turn();
-        }
-        let (key, event) = self.today.pop()?;
-        self.watch.pass(key);
-        Some((key, event))
-    }
     #[inline]
-    fn pop_before(&mut self, bound: Time) -> Option<(Key, E)> {
-        if self.today.is_empty() {
-            self.turn();
-        }
-        let (key, event) = self.today.pop_if(|(key, _)| key.time() < bound)?;
-        self.watch.pass(key);
-        Some((key, event))
-    }
     fn peek(&mut self) -> Option<Key> {
         if self.today.is_empty() {
             self.turn();
         }
         self.today.last().map(|&(key, _)| key)
+    }
+    #[inline]
+    fn take(&mut self) -> (Key, E) {
+        if self.today.is_empty() {
+            self.turn();
+        }
+        let &(key, event) = self.today.last().expect("an event waits");
+        self.today.pop();
+        self.watch.pass(key);
+        (key, event)
     }
     fn len(&self) -> usize {
         self.today.len() + self.noted + self.later.len()
@@ -470,9 +475,7 @@ mod tests {
             let first = (!list.is_empty()).then(|| list.remove(0));
             assert_eq!(queue.peek(), first.map(|(key, _)| key));
             if let Some((key, event)) = first {
-                assert_eq!(queue.pop_before(key.time()), None);
-                let after = Time::from_ticks(key.time().ticks() + 1);
-                assert_eq!(queue.pop_before(after), Some((key, event)));
+                assert_eq!(queue.take(), (key, event));
                 queue.push(key, event);
             }
             assert_eq!(queue.pop(), first);
