@@ -192,14 +192,12 @@ pub struct NearQueue<E> {
     /// Day up to which `today` has everything; the end of all days as long as few events have waited at once.
     date: i64,
     /// Pages of the coming year: for each day, modulo the year, its first note.
-    pages: Vec<Option<NoteId>>,
+    pages: Box<[Option<NoteId>; YEAR]>,
     /// The pages that have notes, as bits.
     marked: u128,
     notes: Vec<Note<E>>,
     /// First of the notes that can be written over.
     blank: Option<NoteId>,
-    /// Notes on all pages.
-    noted: usize,
     /// Events beyond the year.
     later: BinaryHeap<Waiting<E>>,
     watch: Watch,
@@ -223,6 +221,11 @@ struct Note<E> {
 /// Names a note: its index and one.
 type NoteId = core::num::NonZeroU32;
 
+/// Where a note is.
+const fn place(id: NoteId) -> usize {
+    id.get() as usize - 1
+}
+
 /// The day of an event.
 const fn day(key: Key) -> i64 {
     key.time().ticks() >> DAY_BITS
@@ -237,11 +240,10 @@ impl<E: Copy> Default for NearQueue<E> {
         Self {
             today: Vec::with_capacity(ROOM),
             date: i64::MAX,
-            pages: vec![None; YEAR],
+            pages: Box::new([None; YEAR]),
             marked: 0,
             notes: Vec::with_capacity(ROOM),
             blank: None,
-            noted: 0,
             later: BinaryHeap::with_capacity(ROOM),
             watch: Watch::default(),
         }
@@ -319,22 +321,21 @@ impl<E: Copy> NearQueue<E> {
 
     /// Notes an event on the page of its day.
     fn note(&mut self, key: Key, event: E) {
+        let Some(id) = self.blank else { return self.note_anew(key, event) };
         let page = page(day(key));
-        let note = Note { key, event, next: self.pages[page] };
-        let id = if let Some(id) = self.blank { id } else { self.add_blank(note) };
-        let blank = &mut self.notes[id.get() as usize - 1];
-        self.blank = blank.next;
-        *blank = note;
+        let note = &mut self.notes[place(id)];
+        self.blank = note.next;
+        *note = Note { key, event, next: self.pages[page] };
         self.pages[page] = Some(id);
         self.marked |= 1 << page;
-        self.noted += 1;
     }
 
-    /// Room for one more note.
+    /// The same where no note can be written over.
     #[cold]
-    fn add_blank(&mut self, note: Note<E>) -> NoteId {
-        self.notes.push(Note { next: None, ..note });
-        NoteId::new(self.notes.len() as u32).expect("not zero after a push")
+    fn note_anew(&mut self, key: Key, event: E) {
+        self.notes.push(Note { key, event, next: None });
+        self.blank = NoteId::new(self.notes.len() as u32);
+        self.note(key, event);
     }
 
     /// The next day with a note.
@@ -364,14 +365,18 @@ impl<E: Copy> NearQueue<E> {
         self.today.sort_unstable_by(|(a, _), (b, _)| b.cmp(a));
     }
     fn take_page(&mut self, page: usize) {
-        let mut next = self.pages[page].take();
+        let first = self.pages[page].take();
         self.marked &= !(1 << page);
+        let (mut next, mut last) = (first, None);
         while let Some(id) = next {
-            let note = &mut self.notes[id.get() as usize - 1];
+            let note = &self.notes[place(id)];
             self.today.push((note.key, note.event));
-            next = core::mem::replace(&mut note.next, self.blank);
-            self.blank = Some(id);
-            self.noted -= 1;
+            (next, last) = (note.next, Some(id));
+        }
+        // All of them can be written over, before those that could be already.
+        if let Some(last) = last {
+            self.notes[place(last)].next = self.blank;
+            self.blank = first;
         }
     }
 }
@@ -402,7 +407,11 @@ impl<E: Copy> Queue<E> for NearQueue<E> {
         (key, event)
     }
     fn len(&self) -> usize {
-        self.today.len() + self.noted + self.later.len()
+        let blank = core::iter::successors(self.blank, |&id| self.notes[place(id)].next);
+        self.today.len() + self.notes.len() - blank.count() + self.later.len()
+    }
+    fn is_empty(&self) -> bool {
+        self.today.is_empty() && self.marked == 0 && self.later.is_empty()
     }
 }
 
