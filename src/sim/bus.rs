@@ -275,13 +275,14 @@ impl Bus {
     pub fn flight(&self, id: FlightId) -> &Flight {
         &self.flights[usize::from(id.0)]
     }
-    /// A listener has heard it; the last one frees its place.
-    pub fn heard(&mut self, id: FlightId) {
+    /// The same, and that listener has heard it. The last one frees its place, for the next telegram that is sent.
+    pub fn heard(&mut self, id: FlightId) -> &Flight {
         let flight = &mut self.flights[usize::from(id.0)];
         flight.listeners -= 1;
         if flight.listeners == 0 {
             self.free.push(id);
         }
+        flight
     }
     /// How a telegram spreads.
     #[inline]

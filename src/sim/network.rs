@@ -164,6 +164,23 @@ struct Slot<S> {
     number: u64,
 }
 
+impl<S: Station> Slot<S> {
+    /// Lets the station answer into the outbox; without supply it does not. Returns `now` if it has.
+    #[inline(always)]
+    fn ask(&mut self, now: Local, input: Input<'_, S::Command>, out: &mut Outbox) -> Option<Local> {
+        self.powered.then(|| {
+            out.clear();
+            self.site.machine.step(now, input, out);
+            now
+        })
+    }
+    /// The shaft's raw position at `now` (steps); zero without a shaft.
+    #[inline(always)]
+    fn raw(&self, now: Time) -> u32 {
+        self.site.shaft.as_ref().map_or(0, |(shaft, resolution)| resolution.raw(shaft.angle(now)))
+    }
+}
+
 /// A network in time. `Q` is the event queue; any queue gives the same run. A clone goes on as the original does.
 #[derive(Clone)]
 pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
@@ -345,14 +362,15 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
 
     /// The next event. False when nothing will ever happen again.
     fn next<R: Recorder>(&mut self, recorder: &mut R) -> bool {
-        let (key, happening) = match self.queue.pop_before(self.alarms.next()) {
-            Some(next) => next,
-            None if self.alarm(recorder) => return true,
-            None => match self.queue.pop() {
-                Some(next) => next,
-                None => return false,
-            },
-        };
+        if self.queue.peek().is_none_or(|key| key.time() >= self.alarms.next()) {
+            if self.alarm(recorder) {
+                return true;
+            }
+            if self.queue.is_empty() {
+                return false;
+            }
+        }
+        let (key, happening) = self.queue.take();
         self.now = key.time();
         let NetworkEvent { number, event, slot, rank } = happening;
         let slot = usize::from(slot);
@@ -405,8 +423,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         self.now = at;
         self.alarms.disarm((slot, which));
-        let input = self.due(slot, which);
-        self.step(slot, local, input, recorder);
+        let timer = Timer::ALL[which];
+        let busy = timer == Timer::Slot && self.is_busy(slot);
+        self.step(slot, local, Input::Deadline { timer, busy }, recorder);
         true
     }
 
@@ -464,30 +483,26 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// A telegram's end reaches a station. Its reading if it has answered.
     #[inline(always)]
     fn hear(&mut self, index: usize, id: FlightId) -> Option<Local> {
-        let sample = if self.slots[index].sample_with_telegrams { self.raw(index) } else { 0 };
         let deaf = !self.faults.is_empty() && self.is_deaf(index);
         let Self { slots, bus, out, now: instant, .. } = self;
         let slot = &mut slots[index];
-        let flight = bus.flight(id);
+        let hears = slot.powered && !deaf && bus.reaches(id, index);
+        let flight = bus.heard(id);
         // Without octets it was cut off before it began.
-        let hears = slot.powered && !deaf && !flight.frame.is_empty() && bus.reaches(id, index);
-        let now = hears.then(|| slot.site.crystal.to_local(*instant));
-        if let Some(now) = now {
-            out.clear();
-            let octets = if flight.mark.broken { &[] } else { flight.frame.octets() };
-            slot.site.machine.step(now, Input::Telegram(Heard { octets, sample }), out);
+        if !hears || flight.frame.is_empty() {
+            return None;
         }
-        bus.heard(id);
-        now
+        let now = slot.site.crystal.to_local(*instant);
+        let sample = if slot.sample_with_telegrams { slot.raw(*instant) } else { 0 };
+        let octets = if flight.mark.broken { &[] } else { flight.frame.octets() };
+        out.clear();
+        slot.site.machine.step(now, Input::Telegram(Heard { octets, sample }), out);
+        Some(now)
     }
     /// Whether a disturbance keeps a station from hearing.
     #[cold]
     fn is_deaf(&self, slot: usize) -> bool {
         self.faults.deafens(self.slots[slot].address, (self.now, self.clocks_begun(false)))
-    }
-    /// The shaft's raw position now (steps); zero without a shaft.
-    fn raw(&self, slot: usize) -> u32 {
-        self.slots[slot].site.shaft.as_ref().map_or(0, |(shaft, resolution)| resolution.raw(shaft.angle(self.now)))
     }
 
     /// A station's cycle begins. Only those of the first station are the network's.
@@ -508,30 +523,28 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 self.act(act, recorder);
             }
         }
-        self.ask(slot, self.local(slot), Input::Sent)
+        let now = self.local(slot);
+        self.slots[slot].ask(now, Input::Sent, &mut self.out)
     }
 
     /// An event of a deadline comes. The station's reading if it has answered.
     #[inline(always)]
-    fn turn_deadline(&mut self, slot: usize, which: usize) -> Option<Local> {
-        match self.slots[slot].deadlines[which].turn(self.now) {
+    fn turn_deadline(&mut self, index: usize, which: usize) -> Option<Local> {
+        let Self { slots, out, now, .. } = self;
+        let slot = &mut slots[index];
+        match slot.deadlines[which].turn(*now) {
             Turned::Due(local) => {
-                let input = self.due(slot, which);
-                self.ask(slot, local, input)
+                let input = match Timer::ALL.get(which) {
+                    Some(&timer) => Input::Deadline { timer, busy: false },
+                    None => Input::Sample(slot.raw(*now)),
+                };
+                slot.ask(local, input, out)
             }
             Turned::Early(at) => {
-                self.push(at, Phase::Deadline, slot, (Event::Deadline, which as u32));
+                self.push(at, Phase::Deadline, index, (Event::Deadline, which as u32));
                 None
             }
             Turned::Void => None,
-        }
-    }
-    /// What the station learns when the deadline of this number is due.
-    #[inline(always)]
-    fn due(&self, slot: usize, which: usize) -> Input<'static, S::Command> {
-        match Timer::ALL.get(which) {
-            Some(&timer) => Input::Deadline { timer, busy: timer == Timer::Slot && self.is_busy(slot) },
-            None => Input::Sample(self.raw(slot)),
         }
     }
 
@@ -540,19 +553,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.bus.is_busy(self.now, slot) && (self.faults.is_empty() || !self.is_deaf(slot))
     }
 
-    /// Lets a station answer into the outbox; without supply it does not. Returns `now` if it has.
-    #[inline(always)]
-    fn ask(&mut self, slot: usize, now: Local, input: Input<'_, S::Command>) -> Option<Local> {
-        let slot = &mut self.slots[slot];
-        slot.powered.then(|| {
-            self.out.clear();
-            slot.site.machine.step(now, input, &mut self.out);
-            now
-        })
-    }
-    /// The same, and what it answers is carried out.
+    /// Lets a station answer, and carries out what it answers.
     fn step<R: Recorder>(&mut self, slot: usize, now: Local, input: Input<'_, S::Command>, recorder: &mut R) {
-        if let Some(now) = self.ask(slot, now, input) {
+        if let Some(now) = self.slots[slot].ask(now, input, &mut self.out) {
             self.carry_out(slot, now, recorder);
         }
     }
@@ -638,8 +641,10 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 None => return,
             }
         }
-        let on_line = self.bus.send(index, line, self.out.frame(), Mark::OWN);
-        self.sent_off(on_line, Mark::OWN, recorder);
+        let (address, frame) = (self.slots[index].address, self.out.frame());
+        let route = announce(frame, address, line, Mark::OWN, recorder);
+        let on_line = self.bus.send(index, line, frame, Mark::OWN);
+        self.sent_off(on_line, route, Mark::OWN, recorder);
     }
     /// The telegram in the outbox begins a cycle: when it is on the line.
     #[inline(never)]
@@ -653,19 +658,23 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Puts the altered telegram onto the line.
     #[inline(never)]
     fn send_altered<R: Recorder>(&mut self, slot: usize, line: (Time, Time), mark: Mark, recorder: &mut R) {
+        let route = announce(&self.altered, self.slots[slot].address, line, mark, recorder);
         let on_line = self.bus.send(slot, line, &self.altered, mark);
-        self.sent_off(on_line, mark, recorder);
+        self.sent_off(on_line, route, mark, recorder);
     }
-    /// Tells that a telegram is on the line, and its listeners when its end will reach them.
+    /// A telegram is on the line: tells its listeners when its end will reach them.
     #[inline(always)]
-    fn sent_off<R: Recorder>(&mut self, (wave, hit): (Wave, Option<u8>), mark: Mark, recorder: &mut R) {
-        let octets = self.bus.flight(wave.id).frame.octets();
-        let (route, sender) = (Route::of(octets), self.slots[wave.sender].address);
-        recorder.telegram(&Transmission { start: wave.start, end: wave.end, sender, octets, origin: mark.origin });
+    fn sent_off<R: Recorder>(
+        &mut self,
+        (wave, hit): (Wave, Option<u8>),
+        route: Option<Route>,
+        mark: Mark,
+        recorder: &mut R,
+    ) {
         if let Some(with) = hit {
             self.collided(wave.sender, usize::from(with), recorder);
         }
-        self.deliver(&wave, route, mark.apart);
+        self.deliver(wave, route, mark.apart);
     }
     #[cold]
     fn collided<R: Recorder>(&mut self, slot: usize, with: usize, recorder: &mut R) {
@@ -675,4 +684,18 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     fn clocks_begun(&self, clock: bool) -> u64 {
         if clock { self.clocks } else { self.clocks.saturating_sub(1) }
     }
+}
+
+/// Tells that a telegram comes onto the line. Returns its route.
+#[inline(always)]
+fn announce<R: Recorder>(
+    frame: &Frame,
+    sender: Address,
+    (start, end): (Time, Time),
+    mark: Mark,
+    recorder: &mut R,
+) -> Option<Route> {
+    let octets = frame.octets();
+    recorder.telegram(&Transmission { start, end, sender, octets, origin: mark.origin });
+    Route::of(octets)
 }

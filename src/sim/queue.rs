@@ -83,17 +83,20 @@ impl fmt::Debug for Key {
 pub trait Queue<E: Copy>: Default {
     /// Adds an event.
     fn push(&mut self, key: Key, event: E);
+    /// The first event's key.
+    fn peek(&mut self) -> Option<Key>;
     /// Takes the first event out.
     ///
     /// # Panics
-    /// If it is earlier than the one before: somebody pushed an event into the past.
-    fn pop(&mut self) -> Option<(Key, E)>;
-    /// The same if it comes before `bound`.
-    fn pop_before(&mut self, bound: Time) -> Option<(Key, E)> {
-        if self.peek().is_some_and(|key| key.time() < bound) { self.pop() } else { None }
+    /// If no event waits, or it is earlier than the one before: somebody pushed an event into the past.
+    fn take(&mut self) -> (Key, E);
+    /// Takes the first event out if there is one.
+    ///
+    /// # Panics
+    /// As [`take`](Self::take).
+    fn pop(&mut self) -> Option<(Key, E)> {
+        self.peek().map(|_| self.take())
     }
-    /// The first event's key.
-    fn peek(&mut self) -> Option<Key>;
     /// How many events wait.
     fn len(&self) -> usize;
     /// Whether no event waits.
@@ -162,13 +165,13 @@ impl<E: Copy> Queue<E> for HeapQueue<E> {
     fn push(&mut self, key: Key, event: E) {
         self.heap.push(Waiting { key, event });
     }
-    fn pop(&mut self) -> Option<(Key, E)> {
-        let Waiting { key, event } = self.heap.pop()?;
-        self.watch.pass(key);
-        Some((key, event))
-    }
     fn peek(&mut self) -> Option<Key> {
         self.heap.peek().map(|waiting| waiting.key)
+    }
+    fn take(&mut self) -> (Key, E) {
+        let Waiting { key, event } = self.heap.pop().expect("an event waits");
+        self.watch.pass(key);
+        (key, event)
     }
     fn len(&self) -> usize {
         self.heap.len()
@@ -189,14 +192,12 @@ pub struct NearQueue<E> {
     /// Day up to which `today` has everything; the end of all days as long as few events have waited at once.
     date: i64,
     /// Pages of the coming year: for each day, modulo the year, its first note.
-    pages: Vec<Option<NoteId>>,
+    pages: Box<[Option<NoteId>; YEAR]>,
     /// The pages that have notes, as bits.
     marked: u128,
     notes: Vec<Note<E>>,
     /// First of the notes that can be written over.
     blank: Option<NoteId>,
-    /// Notes on all pages.
-    noted: usize,
     /// Events beyond the year.
     later: BinaryHeap<Waiting<E>>,
     watch: Watch,
@@ -220,6 +221,11 @@ struct Note<E> {
 /// Names a note: its index and one.
 type NoteId = core::num::NonZeroU32;
 
+/// Where a note is.
+const fn place(id: NoteId) -> usize {
+    id.get() as usize - 1
+}
+
 /// The day of an event.
 const fn day(key: Key) -> i64 {
     key.time().ticks() >> DAY_BITS
@@ -234,11 +240,10 @@ impl<E: Copy> Default for NearQueue<E> {
         Self {
             today: Vec::with_capacity(ROOM),
             date: i64::MAX,
-            pages: vec![None; YEAR],
+            pages: Box::new([None; YEAR]),
             marked: 0,
             notes: Vec::with_capacity(ROOM),
             blank: None,
-            noted: 0,
             later: BinaryHeap::with_capacity(ROOM),
             watch: Watch::default(),
         }
@@ -281,8 +286,13 @@ impl<E: Copy> NearQueue<E> {
         } else if day - self.date < YEAR as i64 {
             self.note(key, event);
         } else {
-            self.later.push(Waiting { key, event });
+            self.put_later(key, event);
         }
+    }
+    /// The same beyond the year.
+    #[cold]
+    fn put_later(&mut self, key: Key, event: E) {
+        self.later.push(Waiting { key, event });
     }
     /// From now on there are days and pages.
     #[cold]
@@ -295,6 +305,7 @@ impl<E: Copy> NearQueue<E> {
         }
         self.today.drain(..later);
     }
+    #[inline(never)]
     fn insert(&mut self, key: Key, event: E) {
         let len = self.today.len();
         let mut place = len;
@@ -310,20 +321,21 @@ impl<E: Copy> NearQueue<E> {
 
     /// Notes an event on the page of its day.
     fn note(&mut self, key: Key, event: E) {
+        let Some(id) = self.blank else { return self.note_anew(key, event) };
         let page = page(day(key));
-        let note = Note { key, event, next: self.pages[page] };
-        let id = if let Some(id) = self.blank {
-            let blank = &mut self.notes[id.get() as usize - 1];
-            self.blank = blank.next;
-            *blank = note;
-            id
-        } else {
-            self.notes.push(note);
-            NoteId::new(self.notes.len() as u32).expect("not zero after a push")
-        };
+        let note = &mut self.notes[place(id)];
+        self.blank = note.next;
+        *note = Note { key, event, next: self.pages[page] };
         self.pages[page] = Some(id);
         self.marked |= 1 << page;
-        self.noted += 1;
+    }
+
+    /// The same where no note can be written over.
+    #[cold]
+    fn note_anew(&mut self, key: Key, event: E) {
+        self.notes.push(Note { key, event, next: None });
+        self.blank = NoteId::new(self.notes.len() as u32);
+        self.note(key, event);
     }
 
     /// The next day with a note.
@@ -353,14 +365,18 @@ impl<E: Copy> NearQueue<E> {
         self.today.sort_unstable_by(|(a, _), (b, _)| b.cmp(a));
     }
     fn take_page(&mut self, page: usize) {
-        let mut next = self.pages[page].take();
+        let first = self.pages[page].take();
         self.marked &= !(1 << page);
+        let (mut next, mut last) = (first, None);
         while let Some(id) = next {
-            let note = &mut self.notes[id.get() as usize - 1];
+            let note = &self.notes[place(id)];
             self.today.push((note.key, note.event));
-            next = core::mem::replace(&mut note.next, self.blank);
-            self.blank = Some(id);
-            self.noted -= 1;
+            (next, last) = (note.next, Some(id));
+        }
+        // All of them can be written over, before those that could be already.
+        if let Some(last) = last {
+            self.notes[place(last)].next = self.blank;
+            self.blank = first;
         }
     }
 }
@@ -373,31 +389,29 @@ impl<E: Copy> Queue<E> for NearQueue<E> {
             self.put(key, event);
         }
     }
-    fn pop(&mut self) -> Option<(Key, E)> {
-        if self.today.is_empty() {
-            self.turn();
-        }
-        let (key, event) = self.today.pop()?;
-        self.watch.pass(key);
-        Some((key, event))
-    }
     #[inline]
-    fn pop_before(&mut self, bound: Time) -> Option<(Key, E)> {
-        if self.today.is_empty() {
-            self.turn();
-        }
-        let (key, event) = self.today.pop_if(|(key, _)| key.time() < bound)?;
-        self.watch.pass(key);
-        Some((key, event))
-    }
     fn peek(&mut self) -> Option<Key> {
         if self.today.is_empty() {
             self.turn();
         }
         self.today.last().map(|&(key, _)| key)
     }
+    #[inline]
+    fn take(&mut self) -> (Key, E) {
+        if self.today.is_empty() {
+            self.turn();
+        }
+        let &(key, event) = self.today.last().expect("an event waits");
+        self.today.pop();
+        self.watch.pass(key);
+        (key, event)
+    }
     fn len(&self) -> usize {
-        self.today.len() + self.noted + self.later.len()
+        let blank = core::iter::successors(self.blank, |&id| self.notes[place(id)].next);
+        self.today.len() + self.notes.len() - blank.count() + self.later.len()
+    }
+    fn is_empty(&self) -> bool {
+        self.today.is_empty() && self.marked == 0 && self.later.is_empty()
     }
 }
 
@@ -470,9 +484,7 @@ mod tests {
             let first = (!list.is_empty()).then(|| list.remove(0));
             assert_eq!(queue.peek(), first.map(|(key, _)| key));
             if let Some((key, event)) = first {
-                assert_eq!(queue.pop_before(key.time()), None);
-                let after = Time::from_ticks(key.time().ticks() + 1);
-                assert_eq!(queue.pop_before(after), Some((key, event)));
+                assert_eq!(queue.take(), (key, event));
                 queue.push(key, event);
             }
             assert_eq!(queue.pop(), first);

@@ -21,7 +21,7 @@ use crate::time::Time;
 impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// Tells every listener when the telegram's end will reach it.
     #[inline(always)]
-    pub(super) fn deliver(&mut self, wave: &Wave, route: Option<Route>, apart: bool) {
+    pub(super) fn deliver(&mut self, wave: Wave, route: Option<Route>, apart: bool) {
         if let Some(route @ Route { da: Route::TO_ALL, .. }) = route {
             return self.deliver_to_all(wave, route, apart);
         }
@@ -44,7 +44,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.bus.expect_listeners(wave.id, listeners);
     }
     #[inline(never)]
-    fn deliver_to_all(&mut self, wave: &Wave, route: Route, apart: bool) {
+    fn deliver_to_all(&mut self, wave: Wave, route: Route, apart: bool) {
         if !route.reply {
             return self.broadcast(wave, apart);
         }
@@ -62,7 +62,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     /// A request for all passes every filter. Only the nearest neighbour is told now and tells the next one when it has
     /// heard, so that the queue holds one event of the telegram, not one for each station. Where links have jitter, who
     /// is nearest differs from telegram to telegram, and all are told now; so where receivers have.
-    fn broadcast(&mut self, wave: &Wave, apart: bool) {
+    fn broadcast(&mut self, wave: Wave, apart: bool) {
         let count = self.neighbours[wave.sender].len();
         self.bus.expect_listeners(wave.id, count as u16 + u16::from(apart));
         if apart {
@@ -81,13 +81,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     pub(super) fn tell_neighbour(&mut self, id: FlightId, rank: u8) {
         let wave = self.bus.wave(id);
         if let Some(&listener) = self.neighbours[wave.sender].get(usize::from(rank)) {
-            self.push_telegram(listener.into(), &wave, (Event::Broadcast, rank));
+            self.push_telegram(listener.into(), wave, (Event::Broadcast, rank));
         }
     }
     /// The telegram's end reaches `listener`. Of telegrams that end there at one instant the one sent first comes first.
     #[inline(always)]
-    fn push_telegram(&mut self, listener: usize, wave: &Wave, (event, rank): (Event, u8)) {
-        let mut at = self.bus.arrival(wave, listener);
+    fn push_telegram(&mut self, listener: usize, wave: Wave, (event, rank): (Event, u8)) {
+        let mut at = self.bus.arrival(&wave, listener);
         if self.faults.strays_arrivals() {
             at = self.captured(at, wave, listener);
         }
@@ -96,7 +96,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// When a receiver that strays captures the end of a telegram that reaches it `at`.
     #[cold]
-    fn captured(&mut self, at: Time, wave: &Wave, listener: usize) -> Time {
+    fn captured(&mut self, at: Time, wave: Wave, listener: usize) -> Time {
         let running = (wave.start, self.clocks_begun(false));
         let captured = at + self.faults.capture_stray(self.slots[listener].address, running);
         // Nobody hears what has not been said.
