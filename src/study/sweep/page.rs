@@ -11,9 +11,9 @@ use super::shard::Shard;
 use super::summary::Never;
 use crate::study::report::number;
 
-/// What a cycle of a slave costs, rows and histograms included (ns): processor time of a network of 8 encoders on a
-/// virtual AMD EPYC, see `benches/README.md`. It is an estimate before the first run, and nothing depends on it.
-const NS_PER_SLAVE_CYCLE: u64 = 400;
+/// What a cycle of a slave costs in a sweep, rows and histograms included (ns): time of the reference network in
+/// `benches/sweep.rs` on a virtual AMD EPYC. It is an estimate before the first run, and nothing depends on it.
+const NS_PER_SLAVE_CYCLE: u64 = 320;
 /// Most failed runs and refused combinations that a page names.
 pub(super) const NAMED: usize = 10;
 
