@@ -6,6 +6,7 @@
 //! out/<sweep>/results.csv          when all runs are done: a row per run
 //! out/<sweep>/results.parquet      the same, if isodp was built with the feature parquet
 //! out/<sweep>/summary.csv          a row per combination
+//! out/<sweep>/pooled_*.csv         of each pooled quantity a row per combination, and its bins
 //! out/<sweep>/*.svg                figures against parameters, over two of them, and how they are distributed
 //! ```
 
