@@ -590,6 +590,23 @@ fn values_that_the_scenario_does_not_take_are_told_where_the_sweep_has_them() {
 }
 
 #[test]
+#[cfg(unix)]
+fn without_room_for_temporary_files_a_sweep_says_so() {
+    let room = room();
+    let mut call = Command::new(cargo_bin("isodp"));
+    let call = call.args(["sweep", "jitter.toml"]).current_dir(room.path(".")).env("TMPDIR", room.path("nowhere"));
+    let output = call.output().expect("the command runs");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.starts_with("error: cannot index the journal out/jitter/runs/journal.jsonl: no temporary file in "),
+        "{said}"
+    );
+    assert!(said.contains("nowhere") && said.contains("; TMPDIR names another directory"), "{said}");
+    assert!(!room.path("out/jitter/results.csv").exists());
+}
+
+#[test]
 fn two_calls_do_not_write_one_journal() {
     let room = long();
     let mut child = begin(&room);

@@ -8,6 +8,8 @@ use std::collections::BinaryHeap;
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 
+use super::temporary;
+
 /// Values of a piece.
 const PIECE: usize = 1 << 14;
 /// Values of a piece that are read at once.
@@ -55,7 +57,7 @@ impl Unsorted {
         self.piece.sort_unstable();
         let file = match self.file.take() {
             Some(file) => file,
-            None => tempfile::tempfile()?,
+            None => temporary::file()?,
         };
         let mut writer = BufWriter::new(&file);
         for value in self.piece.drain(..) {

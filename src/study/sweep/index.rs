@@ -10,6 +10,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Read, Seek, SeekFrom, Write};
 
 use super::key::RunKey;
+use super::temporary;
 
 /// Octets of a place: the key, where the record is, how long it is, whether it is good.
 const PLACE: usize = 32;
@@ -49,7 +50,7 @@ impl Index {
         Self::with((2 * runs).next_power_of_two().ilog2().max(LEAST_BITS))
     }
     fn with(bits: u32) -> io::Result<Self> {
-        Ok(Self { file: tempfile::tempfile()?, bits, runs: 0 })
+        Ok(Self { file: temporary::file()?, bits, runs: 0 })
     }
 
     /// Where this run's record is; none if it has none.

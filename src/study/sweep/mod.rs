@@ -37,6 +37,7 @@ pub mod shard;
 pub mod skip;
 pub mod store;
 mod summary;
+mod temporary;
 mod worker;
 
 pub(super) use attempt::attempt;
