@@ -130,13 +130,23 @@ impl Route {
     /// Reads the route. None for SC, the token and what does not begin as a telegram: only active stations care.
     #[inline]
     pub fn of(octets: &[u8]) -> Option<Self> {
-        // Destination, source and FC sit at 1 behind SD1 and SD3 and at 4 behind SD2; bit 7 announces a SAP.
+        // Destination, source and FC sit at 4 behind SD2 and at 1 behind SD1 and SD3.
         match *octets {
-            [0x68, _, _, _, da, sa, fc, ..] | [0x10 | 0xA2, da, sa, fc, ..] => {
-                Some(Self { da: da & 0x7F, sa: sa & 0x7F, reply: fc & 0x40 == 0 })
-            }
+            [0x68, _, _, _, da, sa, fc, ..] => Some(Self::read([da, sa, fc])),
+            _ => Self::of_short(octets),
+        }
+    }
+    #[cold]
+    fn of_short(octets: &[u8]) -> Option<Self> {
+        match *octets {
+            [0x10 | 0xA2, da, sa, fc, ..] => Some(Self::read([da, sa, fc])),
             _ => None,
         }
+    }
+    #[inline]
+    const fn read([da, sa, fc]: [u8; 3]) -> Self {
+        // Bit 7 announces a SAP.
+        Self { da: da & 0x7F, sa: sa & 0x7F, reply: fc & 0x40 == 0 }
     }
 }
 
@@ -225,7 +235,7 @@ impl Outbox {
     /// Deadlines of a station: the timers by their numbers, and behind them the asked sample.
     pub const DEADLINES: usize = Self::SAMPLE + 1;
     /// Number of the asked sample among the deadlines.
-    const SAMPLE: usize = Timer::ALL.len();
+    pub const SAMPLE: usize = Timer::ALL.len();
 
     /// An empty outbox.
     pub const fn new() -> Self {

@@ -51,50 +51,69 @@ pub struct Flight {
     listeners: u16,
 }
 
-/// Names a telegram until its last listener has heard it.
+impl Flight {
+    /// The place of a telegram; none has been here.
+    const fn blank(place: usize) -> Self {
+        Self {
+            start: Time::ZERO,
+            end: Time::ZERO,
+            sender: 0,
+            number: place as u64,
+            strays: Vec::new(),
+            frame: Frame::new(),
+            mark: Mark::OWN,
+            listeners: 0,
+        }
+    }
+    /// Whether it is on the line at some time: it was not cut off before it began.
+    fn is_real(&self) -> bool {
+        !self.frame.is_empty()
+    }
+    /// Whether it is one of the `recent` telegrams before the one of this number.
+    fn is_just_before(&self, number: u64, recent: u64) -> bool {
+        self.number < number && self.number + recent >= number && self.is_real()
+    }
+}
+
+/// Names a telegram until its last listener has heard it: its number, as far as it tells it from all others on the line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct FlightId(u16);
+pub struct FlightId(u32);
 
 impl FlightId {
     /// The name of this number.
     #[inline]
     pub const fn of(number: u32) -> Self {
-        Self(number as u16)
+        Self(number)
     }
     /// Its number.
     #[inline]
     pub const fn number(self) -> u32 {
-        self.0 as u32
+        self.0
     }
 }
 
 /// What decides when a telegram reaches its listeners.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Wave {
-    /// The telegram.
-    pub id: FlightId,
     /// Index of the sending station.
     pub sender: usize,
-    /// First bit at the sender.
-    pub start: Time,
     /// Last bit at the sender.
     pub end: Time,
     /// Number of the telegram, counted on the line.
     pub number: u64,
 }
 
-/// Telegrams kept for telling whether the line is busy somewhere: more are never near each other. A power of two.
-const RECENT: usize = 8;
-
-/// When a telegram was on the line at its sender.
-#[derive(Clone, Debug)]
-struct Sent {
-    start: Time,
-    end: Time,
-    sender: usize,
-    strays: Vec<Span>,
-    apart: bool,
+impl Wave {
+    /// The telegram.
+    #[inline]
+    pub const fn id(self) -> FlightId {
+        FlightId(self.number as u32)
+    }
 }
+
+/// Telegrams looked at for telling whether the line is busy somewhere: more are never near each other. A power of two, and
+/// twice as many are kept.
+const RECENT: usize = 8;
 
 /// The bus.
 #[derive(Clone, Debug)]
@@ -102,13 +121,12 @@ pub struct Bus {
     delays: Delays,
     /// Of the links that have any, in the order of `delays`.
     jitter: Vec<LinkJitter>,
+    /// The telegrams sent last, each at the place of its number among as many as there are, a power of two.
     flights: Vec<Flight>,
-    free: Vec<FlightId>,
     /// Telegrams sent.
     sent: u64,
-    /// The telegrams sent last, each at the place of its number among so many.
-    recent: Vec<Sent>,
-    kept: usize,
+    /// How many of them may still be on the line somewhere.
+    recent: u64,
     cuts: Cuts,
     /// From here on nothing is on the line, and a telegram may begin.
     clear_from: Time,
@@ -118,15 +136,13 @@ pub struct Bus {
 
 impl Bus {
     /// A silent bus. `jitter` is that of the links whose paths `delays` knows as unsteady, in the same order.
-    pub const fn new(delays: Delays, jitter: Vec<LinkJitter>) -> Self {
+    pub fn new(delays: Delays, jitter: Vec<LinkJitter>) -> Self {
         Self {
             delays,
             jitter,
-            flights: Vec::new(),
-            free: Vec::new(),
+            flights: (0..RECENT * 2).map(Flight::blank).collect(),
             sent: 0,
-            recent: Vec::new(),
-            kept: RECENT,
+            recent: RECENT as u64,
             cuts: Cuts::none(),
             clear_from: Time::ZERO,
             t_syn: Span::ZERO,
@@ -136,7 +152,8 @@ impl Bus {
     /// short ones of the others: 255 characters last as long as 50 tokens with their pauses.
     #[must_use]
     pub fn with_cuts(self, cuts: Cuts) -> Self {
-        Self { kept: if cuts.is_empty() { RECENT } else { RECENT * 8 }, cuts, ..self }
+        let recent = if cuts.is_empty() { RECENT } else { RECENT * 8 };
+        Self { flights: (0..recent * 2).map(Flight::blank).collect(), recent: recent as u64, cuts, ..self }
     }
     /// The disturbance called `name` cuts the cable at this place from now on, or it is whole again.
     pub fn cut(&mut self, (name, place): (&str, Place), open: bool, now: Time) {
@@ -146,14 +163,18 @@ impl Bus {
             return;
         }
         // What is on the line in both parts meets.
-        let Self { flights, recent, cuts, .. } = self;
-        for flight in flights.iter_mut().filter(|flight| flight.listeners > 0 && !flight.frame.is_empty()) {
-            let meets = |sent: &Sent| {
-                let (a, b) = (flight.sender, sent.sender);
-                let both = (flight.start.max(sent.start).max(now), flight.end.min(sent.end));
+        let Self { flights, sent, recent, cuts, .. } = self;
+        for place in 0..flights.len() {
+            let flight = &flights[place];
+            let meets = |other: &Flight| {
+                let (a, b) = (flight.sender, other.sender);
+                let both = (flight.start.max(other.start).max(now), flight.end.min(other.end));
                 cuts.part_by(before, a, b) && !cuts.part(a, b) && both.0 < both.1
             };
-            flight.mark.broken |= recent.iter().any(meets);
+            let waits = flight.listeners > 0 && flight.is_real();
+            if waits && flights.iter().any(|other| other.is_just_before(*sent, *recent) && meets(other)) {
+                flights[place].mark.broken = true;
+            }
         }
     }
     /// Whether a telegram that ends at `listener` now has come there whole.
@@ -186,23 +207,17 @@ impl Bus {
     /// any.
     #[inline(always)]
     pub fn send(&mut self, sender: usize, (start, end): (Time, Time), frame: &Frame, mark: Mark) -> (Wave, Option<u8>) {
-        let id = match self.free.pop() {
-            Some(id) => id,
-            None => self.add_flight(mark),
-        };
-        let flight = &mut self.flights[usize::from(id.0)];
-        flight.frame.copy_from(frame);
-        (flight.start, flight.end, flight.sender, flight.listeners) = (start, end, sender, 0);
-        let wave = Wave { id, sender, start, end, number: self.sent };
-        (flight.mark, flight.number) = (mark, wave.number);
-        let hit = if start < self.clear_from { self.collide(id) } else { None };
-        // For `is_busy`, instead of the oldest kept.
-        match self.recent.get_mut(wave.number as usize & (self.kept - 1)) {
-            Some(kept) => (kept.start, kept.end, kept.sender, kept.apart) = (start, end, sender, mark.apart),
-            None => self.recent.push(Sent { start, end, sender, strays: Vec::new(), apart: mark.apart }),
+        let wave = Wave { sender, end, number: self.sent };
+        if self.flight(wave.id()).listeners > 0 {
+            self.make_room();
         }
+        let flight = self.flight_mut(wave.id());
+        flight.frame.copy_from(frame);
+        (flight.start, flight.end, flight.sender) = (start, end, sender);
+        (flight.mark, flight.number) = (mark, wave.number);
+        let hit = if start < self.clear_from { self.collide(wave.id()) } else { None };
         if !self.jitter.is_empty() {
-            self.stray(id);
+            self.stray(wave.id());
         }
         self.sent = wave.number + 1;
         self.clear_from = self.clear_from.max(if mark.apart { end + self.t_syn } else { end });
@@ -211,101 +226,101 @@ impl Bus {
     /// Draws what the links with jitter make of the telegram that is sent.
     #[cold]
     fn stray(&mut self, id: FlightId) {
-        let flight = &mut self.flights[usize::from(id.0)];
-        flight.strays.clear();
-        flight.strays.extend(self.jitter.iter_mut().map(LinkJitter::draw));
-        self.recent[self.sent as usize & (self.kept - 1)].strays.clone_from(&flight.strays);
+        let mut strays = core::mem::take(&mut self.flight_mut(id).strays);
+        strays.clear();
+        strays.extend(self.jitter.iter_mut().map(LinkJitter::draw));
+        self.flight_mut(id).strays = strays;
     }
-    /// Room for one more telegram under way.
+    /// So many telegrams have followed one that somebody has not heard yet: twice as many are kept from now on.
     #[cold]
-    fn add_flight(&mut self, mark: Mark) -> FlightId {
-        let (strays, frame, at) = (Vec::new(), Frame::new(), Time::ZERO);
-        self.flights.push(Flight { start: at, end: at, sender: 0, number: 0, strays, frame, mark, listeners: 0 });
-        FlightId(self.flights.len() as u16 - 1)
+    fn make_room(&mut self) {
+        let kept = self.flights.len() * 2;
+        let before = core::mem::replace(&mut self.flights, (0..kept).map(Flight::blank).collect());
+        for flight in before {
+            let place = flight.number as usize & (kept - 1);
+            self.flights[place] = flight;
+        }
     }
     /// Overlapping characters fail their parity, and so receivers drop all telegrams that overlap with this one. What is
     /// apart spoils the idle time before a request too. Returns the sender of one that overlaps, the one that ends last.
     #[cold]
     fn collide(&mut self, id: FlightId) -> Option<u8> {
-        let Flight { start, end, sender, mark, ref frame, .. } = self.flights[usize::from(id.0)];
+        let &Flight { start, end, sender, number, mark, ref frame, .. } = self.flight(id);
         let needs_idle = begins_with_idle(frame.octets());
         let Self { flights, recent, cuts, t_syn, .. } = self;
-        let t_syn = *t_syn;
+        let (t_syn, recent) = (*t_syn, *recent);
         let overlaps =
             |(from, to): (Time, Time), other: usize| from < to && start < to && from < end && !cuts.part(sender, other);
         // What listeners wait for, however long ago it was sent.
-        for other in flights.iter_mut().filter(|other| other.listeners > 0 && !other.frame.is_empty()) {
+        for other in flights.iter_mut().filter(|other| other.listeners > 0 && other.is_real()) {
             let spoilt = mark.apart && begins_with_idle(other.frame.octets());
             let end = if spoilt { end + t_syn } else { end };
             other.mark.broken |= start < other.end && other.start < end && !cuts.part(sender, other.sender);
         }
-        // One that was cut off before it began is as long as nothing.
-        let others = recent.iter().filter(|sent| overlaps((sent.start, sent.end), sent.sender));
-        let hit = others.max_by_key(|sent| sent.end).map(|sent| sent.sender);
-        let spoils = |sent: &Sent| {
+        let others = || flights.iter().filter(|other| other.is_just_before(number, recent));
+        let hit = others().filter(|sent| overlaps((sent.start, sent.end), sent.sender));
+        let hit = hit.max_by_key(|sent| (sent.end, sent.number)).map(|sent| sent.sender);
+        let spoils = |sent: &Flight| {
             let too_soon = start >= sent.end && start < sent.end + t_syn;
-            sent.apart && needs_idle && too_soon && !cuts.part(sender, sent.sender)
+            sent.mark.apart && needs_idle && too_soon && !cuts.part(sender, sent.sender)
         };
-        let broken = hit.is_some() || recent.iter().any(spoils);
-        flights[usize::from(id.0)].mark.broken |= broken;
+        let broken = hit.is_some() || others().any(spoils);
+        self.flight_mut(id).mark.broken |= broken;
         hit.map(|sender| sender as u8)
     }
     /// The station `sender` lost its supply at `now`: what it would have sent later never reaches the line. What is
     /// under way is finished (Model: a telegram that breaks off would be dropped all the same).
     pub fn silence(&mut self, sender: usize, now: Time) {
-        let coming = |by: usize, start: Time| by == sender && start > now;
-        for (index, flight) in self.flights.iter_mut().enumerate() {
-            if coming(flight.sender, flight.start) && !self.free.contains(&FlightId(index as u16)) {
-                flight.frame.clear();
-            }
-        }
-        for sent in self.recent.iter_mut().filter(|sent| coming(sent.sender, sent.start)) {
-            sent.end = sent.start;
+        for flight in self.flights.iter_mut().filter(|flight| flight.sender == sender && flight.start > now) {
+            flight.frame.clear();
         }
     }
 
     /// So many stations will hear the end of this telegram, which was just sent.
     pub fn expect_listeners(&mut self, id: FlightId, count: u16) {
-        self.flights[usize::from(id.0)].listeners = count;
-        if count == 0 {
-            self.free.push(id);
-        }
+        self.flight_mut(id).listeners = count;
     }
     /// The telegram, for a listener that hears its end now.
+    #[inline]
     pub fn flight(&self, id: FlightId) -> &Flight {
-        &self.flights[usize::from(id.0)]
+        &self.flights[id.0 as usize & (self.flights.len() - 1)]
     }
-    /// The same, and that listener has heard it. The last one frees its place, for the next telegram that is sent.
+    #[inline]
+    fn flight_mut(&mut self, id: FlightId) -> &mut Flight {
+        let place = id.0 as usize & (self.flights.len() - 1);
+        &mut self.flights[place]
+    }
+    /// The same, and that listener has heard it.
+    #[inline]
     pub fn heard(&mut self, id: FlightId) -> &Flight {
-        let flight = &mut self.flights[usize::from(id.0)];
+        let flight = self.flight_mut(id);
         flight.listeners -= 1;
-        if flight.listeners == 0 {
-            self.free.push(id);
-        }
         flight
     }
     /// How a telegram spreads.
     #[inline]
     pub fn wave(&self, id: FlightId) -> Wave {
-        let &Flight { start, end, sender, number, .. } = self.flight(id);
-        Wave { id, sender, start, end, number }
+        let &Flight { end, sender, number, .. } = self.flight(id);
+        Wave { sender, end, number }
     }
     /// When a telegram's last bit reaches the station `listener`.
     #[inline]
-    pub fn arrival(&self, wave: &Wave, listener: usize) -> Time {
+    pub fn arrival(&self, wave: Wave, listener: usize) -> Time {
         if !self.delays.is_steady() {
-            return self.strayed_arrival(wave, listener);
+            return self.strayed_arrival(wave.id(), listener);
         }
         wave.end + self.delays.nominal(wave.sender, listener)
     }
     /// The same with the jitter of links, out of the way of networks that have none.
     #[cold]
-    fn strayed_arrival(&self, wave: &Wave, listener: usize) -> Time {
-        wave.end + self.delays.of(wave.sender, listener, &self.flight(wave.id).strays)
+    fn strayed_arrival(&self, id: FlightId, listener: usize) -> Time {
+        let &Flight { end, sender, ref strays, .. } = self.flight(id);
+        end + self.delays.of(sender, listener, strays)
     }
     /// Whether the station `listener` sees characters at `now`.
     pub fn is_busy(&self, now: Time, listener: usize) -> bool {
-        self.recent.iter().filter(|sent| !self.cuts.part(sent.sender, listener)).any(|sent| {
+        let recent = self.flights.iter().filter(|sent| sent.is_just_before(self.sent, self.recent));
+        recent.filter(|sent| !self.cuts.part(sent.sender, listener)).any(|sent| {
             let delay = self.delays.of(sent.sender, listener, &sent.strays);
             sent.start + delay <= now && now < sent.end + delay
         })
@@ -343,16 +358,19 @@ mod tests {
     #[test]
     fn telegrams_that_overlap_are_both_garbled_and_those_that_follow_are_not() {
         let mut bus = line();
-        let (Wave { id: a, .. }, clean) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
+        let (a, clean) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
+        let a = a.id();
         bus.expect_listeners(a, 1);
-        let (Wave { id: b, .. }, hit) = bus.send(1, (ns(99), ns(199)), &token(), Mark::OWN);
+        let (b, hit) = bus.send(1, (ns(99), ns(199)), &token(), Mark::OWN);
+        let b = b.id();
         bus.expect_listeners(b, 1);
         assert_eq!((clean, hit), (None, Some(0)));
         for id in [a, b] {
             assert!(bus.flight(id).mark.broken);
             bus.heard(id);
         }
-        let (Wave { id: c, .. }, hit) = bus.send(0, (ns(199), ns(299)), &token(), Mark::OWN);
+        let (c, hit) = bus.send(0, (ns(199), ns(299)), &token(), Mark::OWN);
+        let c = c.id();
         assert_eq!((hit, bus.flight(c).mark.broken), (None, false));
     }
 
@@ -360,7 +378,8 @@ mod tests {
     fn a_telegram_that_is_hit_twice_is_as_broken_and_one_that_fits_before_another_is_not_hit() {
         let mut bus = line();
         let mut put = |sender, from, to| {
-            let (Wave { id, .. }, hit) = bus.send(sender, (ns(from), ns(to)), &token(), Mark::OWN);
+            let (wave, hit) = bus.send(sender, (ns(from), ns(to)), &token(), Mark::OWN);
+            let id = wave.id();
             bus.expect_listeners(id, 1);
             (id, hit)
         };
@@ -379,7 +398,8 @@ mod tests {
         let mut answer = Frame::new();
         answer.set_short_ack();
         let mut put = |from, to, frame: &Frame, mark| {
-            let (Wave { id, .. }, hit) = bus.send(0, (ns(from), ns(to)), frame, mark);
+            let (wave, hit) = bus.send(0, (ns(from), ns(to)), frame, mark);
+            let id = wave.id();
             bus.expect_listeners(id, 1);
             assert_eq!(hit, None);
             id
@@ -398,12 +418,14 @@ mod tests {
     #[test]
     fn what_a_station_without_supply_had_planned_never_comes() {
         let mut bus = line();
-        let (Wave { id: running, .. }, _) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
+        let (running, _) = bus.send(0, (ns(0), ns(100)), &token(), Mark::OWN);
+        let running = running.id();
         bus.expect_listeners(running, 1);
         bus.silence(0, ns(50));
         assert_eq!(bus.flight(running).frame.octets(), token().octets(), "under way, it is finished");
         bus.heard(running);
-        let (Wave { id: planned, .. }, _) = bus.send(0, (ns(500), ns(600)), &token(), Mark::OWN);
+        let (planned, _) = bus.send(0, (ns(500), ns(600)), &token(), Mark::OWN);
+        let planned = planned.id();
         bus.expect_listeners(planned, 1);
         bus.silence(1, ns(300));
         assert!(!bus.flight(planned).frame.is_empty(), "another station's supply");
@@ -418,9 +440,9 @@ mod tests {
     fn a_receiver_sees_the_line_busy_one_delay_later() {
         let mut bus = line();
         let (wave, _) = bus.send(0, (ns(100), ns(200)), &token(), Mark::OWN);
-        assert_eq!((wave.number, bus.wave(wave.id)), (0, wave));
+        assert_eq!((wave.number, bus.wave(wave.id())), (0, wave));
         assert_eq!([149, 150, 249, 250].map(|t| bus.is_busy(ns(t), 1)), [false, true, true, false]);
-        assert_eq!((bus.arrival(&wave, 0), bus.arrival(&wave, 1)), (ns(200), ns(250)));
+        assert_eq!((bus.arrival(wave, 0), bus.arrival(wave, 1)), (ns(200), ns(250)));
         // Forgotten when as many as are kept have followed.
         for _ in 0..RECENT {
             bus.send(1, (ns(1_000), ns(1_100)), &token(), Mark::OWN);
@@ -440,7 +462,7 @@ mod tests {
         for sender in [0, 1, 2].into_iter().cycle().take(300) {
             let start = ns(strays.len() as i64 * 1_000);
             let (wave, _) = bus.send(sender, (start, start + Span::from_ns(300)), &token(), Mark::OWN);
-            let delay = |listener| bus.arrival(&wave, listener) - wave.end;
+            let delay = |listener| bus.arrival(wave, listener) - wave.end;
             let stray = expected.draw();
             let behind = Span::from_ns(100) + stray;
             let all = if sender < 2 {
@@ -451,10 +473,10 @@ mod tests {
             assert_eq!([0, 1, 2, 3].map(delay), all);
             let far = if sender < 2 { 3 } else { 0 };
             let tick = Span::from_ticks(1);
-            let seen = [start + behind - tick, start + behind, bus.arrival(&wave, far) - tick, bus.arrival(&wave, far)];
+            let seen = [start + behind - tick, start + behind, bus.arrival(wave, far) - tick, bus.arrival(wave, far)];
             assert_eq!(seen.map(|now| bus.is_busy(now, far)), [false, true, true, false]);
-            bus.expect_listeners(wave.id, 1);
-            bus.heard(wave.id);
+            bus.expect_listeners(wave.id(), 1);
+            bus.heard(wave.id());
             strays.push(stray);
         }
         let most = Span::from_ns(36);

@@ -26,7 +26,7 @@ use crate::sim::fault::Faults;
 use crate::sim::jitter::JitterSource;
 use crate::sim::motion::{Resolution, Shaft};
 use crate::sim::noise::LinkJitter;
-use crate::sim::queue::{Key, NearQueue, Phase, Queue};
+use crate::sim::queue::{Key, Lane, NearQueue, Phase, Queue};
 use crate::sim::record::{Recorder, Stamp, Transmission};
 use crate::sim::topology::{Delays, Place, Tree};
 use crate::time::{BitRate, Local, Time};
@@ -34,6 +34,7 @@ use crate::wire::{Address, Frame};
 use alarms::Alarms;
 use deadline::{Deadline, Turned};
 use disturbed::Held;
+use listeners::Neighbour;
 use turn::Turning;
 
 mod alter;
@@ -107,9 +108,10 @@ pub enum Until {
 }
 
 /// What happens to a station; the number of the event tells which.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 enum Event {
     /// An order of the scenario, by its place among them.
+    #[default]
     Act,
     /// A telegram's end, by the telegram's place.
     Telegram,
@@ -127,6 +129,24 @@ enum Event {
     Step,
     /// A disturbance puts something on the line, by its number among those that turn.
     Source,
+}
+
+impl Event {
+    /// The row of a telegram's arrivals that are all known when it is sent.
+    const ARRIVALS: Lane = Lane::Row(2);
+
+    /// Where the event of this number waits: T_O and latches come one station after the other, as the clock came to them,
+    /// and what disturbances and the scenario plan may lie far ahead.
+    #[inline(always)]
+    const fn lane(self, number: usize) -> Lane {
+        const SET_POINT: usize = Timer::SetPoint as usize;
+        match (self, number) {
+            (Self::Deadline, SET_POINT) => Lane::Row(0),
+            (Self::Deadline, Outbox::SAMPLE) => Lane::Row(1),
+            (Self::Deadline | Self::Telegram | Self::Broadcast | Self::Sent | Self::Held, _) => Lane::Soon,
+            (Self::Act | Self::Turn | Self::Step | Self::Source, _) => Lane::Any,
+        }
+    }
 }
 
 /// What a station's supply depends on.
@@ -193,7 +213,9 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     /// Slots that hear replies to all stations.
     subscribers: Vec<u8>,
     /// For each slot all others, in the order in which a telegram reaches them.
-    neighbours: Vec<Vec<u8>>,
+    neighbours: Vec<Vec<Neighbour>>,
+    /// Of each address the slot that hears what is for it alone, and does not hear everything.
+    addressed: [Option<u8>; 128],
     bus: Bus,
     queue: Q,
     alarms: Alarms,
@@ -212,6 +234,8 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     turning: Vec<Turning<S::Command>>,
     next_turn: u64,
     now: Time,
+    /// Nothing later than this happens in the running call.
+    limit: Time,
     /// Cycles that the first station has begun, with a lost SYNCH too.
     clocks: u64,
     out: Outbox,
@@ -220,7 +244,7 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
 /// An event of a network. Opaque: only queues handle it.
 ///
 /// Its parts lie beside each other, not in the variants of an enum, so that each is written and read by itself.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct NetworkEvent {
     number: u32,
     event: Event,
@@ -276,6 +300,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             attentive: Vec::new(),
             subscribers: Vec::new(),
             neighbours: Vec::new(),
+            addressed: [None; 128],
             bus: wiring.bus(&places).with_t_syn(rate.span(BusParams::T_SYN)),
             queue: Q::default(),
             jitter,
@@ -289,6 +314,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             turning: Vec::new(),
             next_turn: u64::MAX,
             now: Time::ZERO,
+            limit: Time::MAX,
             clocks: 0,
             out: Outbox::new(),
         };
@@ -330,8 +356,12 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         Some(&self.slots[usize::from(slot)].site.machine)
     }
 
-    /// Runs for at most `budget` events. Tells whether `until` is reached.
+    /// Runs for at most `budget` events; a telegram that reaches many stations with nothing in between is one. Tells whether `until` is reached.
     pub fn run<R: Recorder>(&mut self, until: Until, budget: u64, recorder: &mut R) -> bool {
+        self.limit = match until {
+            Until::Cycle(_) => Time::MAX,
+            Until::Time(end) => end,
+        };
         for _ in 0..budget {
             let over = match until {
                 Until::Cycle(cycle) => self.clocks > cycle,
@@ -372,23 +402,36 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         let (key, happening) = self.queue.take();
         self.now = key.time();
-        let NetworkEvent { number, event, slot, rank } = happening;
-        let slot = usize::from(slot);
-        let answered = match event {
-            Event::Telegram | Event::Broadcast => {
-                let id = FlightId::of(number);
-                if event == Event::Broadcast {
-                    self.tell_neighbour(id, rank + 1);
+        let NetworkEvent { number, event, slot, mut rank } = happening;
+        let mut slot = usize::from(slot);
+        loop {
+            let (answered, onward) = match event {
+                Event::Telegram => (self.hear(slot, FlightId::of(number)), None),
+                Event::Broadcast => {
+                    rank += 1;
+                    let id = FlightId::of(number);
+                    let onward = self.onward(id, rank);
+                    (self.hear(slot, id), onward)
                 }
-                self.hear(slot, id)
+                Event::Deadline => (self.turn_deadline(slot, number as usize), None),
+                _ => (self.happen(slot, (event, number as usize), recorder), None),
+            };
+            if let Some(now) = answered {
+                self.carry_out(slot, now, recorder);
             }
-            Event::Deadline => self.turn_deadline(slot, number as usize),
-            _ => self.happen(slot, (event, number as usize), recorder),
-        };
-        if let Some(now) = answered {
-            self.carry_out(slot, now, recorder);
+            let Some((key, listener)) = onward else { return true };
+            if !self.is_next(key) {
+                self.queue.push(Lane::Soon, key, NetworkEvent { number, event, slot: listener, rank });
+                return true;
+            }
+            (self.now, slot) = (key.time(), listener.into());
         }
-        true
+    }
+    /// Whether an event with this key, which is not in the queue, comes before all others.
+    #[inline(always)]
+    fn is_next(&self, key: Key) -> bool {
+        let time = key.time();
+        time < self.alarms.next() && time <= self.limit && self.queue.peek().is_none_or(|head| key < head)
     }
     /// What comes less often than telegrams and deadlines. The reading at which the station has answered, if that is to be
     /// carried out.
@@ -616,18 +659,18 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let key = Key::new(at, Phase::Deadline, slot.address.get(), slot.number);
             slot.number += 1;
             let (number, event) = (which as u32, Event::Deadline);
-            queue.push(key, NetworkEvent { number, event, slot: index as u8, rank: 0 });
+            queue.push(event.lane(which), key, NetworkEvent { number, event, slot: index as u8, rank: 0 });
         }
     }
     fn push(&mut self, at: Time, phase: Phase, index: usize, (event, number): (Event, u32)) {
         let slot = &mut self.slots[index];
         let key = Key::new(at, phase, slot.address.get(), slot.number);
         slot.number += 1;
-        self.queue.push(key, NetworkEvent { number, event, slot: index as u8, rank: 0 });
+        self.queue.push(event.lane(number as usize), key, NetworkEvent { number, event, slot: index as u8, rank: 0 });
     }
 
     /// Puts the telegram in the outbox onto the line.
-    #[inline(never)]
+    #[inline(always)]
     fn transmit<R: Recorder>(&mut self, index: usize, send: Send, recorder: &mut R) {
         let crystal = &self.slots[index].site.crystal;
         let length = self.rate.octets(self.out.frame().len());

@@ -3,6 +3,9 @@
 //! Two queues stand behind one trait. [`NearQueue`] is the fast one; [`HeapQueue`] is the plain one that it is compared
 //! with. Both give the same order for the same pushes, because no two keys are equal.
 
+// See `network`.
+#![allow(clippy::inline_always)]
+
 use crate::time::Time;
 use core::fmt;
 use std::collections::BinaryHeap;
@@ -42,6 +45,8 @@ pub struct Key(u128);
 impl Key {
     /// Largest number of an event: a station that makes ten million a second reaches it after ten months.
     pub const MAX_NUMBER: u64 = (1 << 48) - 1;
+    /// Behind every event.
+    const NEVER: Self = Self(u128::MAX);
     /// Turns the order of signed times into that of unsigned bits.
     const SIGN: u64 = 1 << 63;
 
@@ -81,10 +86,10 @@ impl fmt::Debug for Key {
 ///
 /// Keys are unique; pushing one that waits already is a mistake that the order of the two would show.
 pub trait Queue<E: Copy>: Default {
-    /// Adds an event.
-    fn push(&mut self, key: Key, event: E);
+    /// Adds an event, where it may wait.
+    fn push(&mut self, lane: Lane, key: Key, event: E);
     /// The first event's key.
-    fn peek(&mut self) -> Option<Key>;
+    fn peek(&self) -> Option<Key>;
     /// Takes the first event out.
     ///
     /// # Panics
@@ -105,8 +110,27 @@ pub trait Queue<E: Copy>: Default {
     }
 }
 
-/// Room for the events of a full network, 126 stations with a few deadlines each, before a queue grows.
-const ROOM: usize = 1_024;
+/// Room for one event of each station of a full network, and some: in a row, and in what grows before it does.
+const ROOM: usize = 1 << u8::BITS;
+/// Steps from the end of a list before a search halves.
+const STEPS: usize = 8;
+
+/// When an event will come, as far as its kind tells: a hint that says where it waits best. It never changes the order, only
+/// what the event costs.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Lane {
+    /// Before nearly all that wait: what is pushed last is taken first.
+    Soon,
+    /// After nearly all that wait in the row of this number, which is below [`Self::ROWS`].
+    Row(usize),
+    /// At any time.
+    Any,
+}
+
+impl Lane {
+    /// How many rows there are.
+    pub const ROWS: usize = 3;
+}
 
 /// Watches that time goes on.
 #[derive(Clone, Copy, Debug)]
@@ -162,10 +186,10 @@ impl<E: Copy> Default for HeapQueue<E> {
     }
 }
 impl<E: Copy> Queue<E> for HeapQueue<E> {
-    fn push(&mut self, key: Key, event: E) {
+    fn push(&mut self, _lane: Lane, key: Key, event: E) {
         self.heap.push(Waiting { key, event });
     }
-    fn peek(&mut self) -> Option<Key> {
+    fn peek(&self) -> Option<Key> {
         self.heap.peek().map(|waiting| waiting.key)
     }
     fn take(&mut self) -> (Key, E) {
@@ -178,240 +202,219 @@ impl<E: Copy> Queue<E> for HeapQueue<E> {
     }
 }
 
-/// The fast queue: a calendar.
+/// The fast queue: a stack, and beside it a few rows and a heap, as [`Lane`] says.
 ///
-/// Today's events are sorted. Most events of a bus cycle come next as soon as they are pushed (a request, its answer, its
-/// echo): they end the list of today and leave it at once. Events of another day of the coming year are noted on the
-/// page of that day, in no order, and sorted when the day has come. The few that are later still wait in a heap.
-///
-/// As long as few events wait, as in a network of one or two slaves, pages are not worth it: today does not end.
+/// A bus cycle is a chain of events of which each is the next one of all as soon as it is known (a request, its answer, the
+/// next request): they lie on the stack and leave it at once. Between them come events that were known long before, in the
+/// order in which they became known: every station's T_O, every station's latch. They stand in rows, and the first one of
+/// each row lies on the stack and stands for all of it, as the first one of the heap does. So the stack stays short, and an
+/// event is compared with few others.
 #[derive(Clone, Debug)]
 pub struct NearQueue<E> {
-    /// Events of `date` and of days before it, descending: the next one is the last.
-    today: Vec<(Key, E)>,
-    /// Day up to which `today` has everything; the end of all days as long as few events have waited at once.
-    date: i64,
-    /// Pages of the coming year: for each day, modulo the year, its first note.
-    pages: Box<[Option<NoteId>; YEAR]>,
-    /// The pages that have notes, as bits.
-    marked: u128,
-    notes: Vec<Note<E>>,
-    /// First of the notes that can be written over.
-    blank: Option<NoteId>,
-    /// Events beyond the year.
-    later: BinaryHeap<Waiting<E>>,
+    /// Descending: the next one is the last.
+    stack: Vec<Next<E>>,
+    rows: [Row<E>; Lane::ROWS],
+    heap: BinaryHeap<Waiting<E>>,
+    /// Key of the event that stands for the heap; [`Key::NEVER`] where none does.
+    heap_head: Key,
     watch: Watch,
 }
 
-/// Bits of a tick's number within its day: a day is 0.35 ms.
-const DAY_BITS: u32 = 22;
-/// Days in a year: 45 ms, more than the longest T_DP.
-const YEAR: usize = u128::BITS as usize;
-/// So many events are kept in order faster than noted.
-const FEW: usize = 12;
-
-/// An event on a page.
+/// An event on the stack.
 #[derive(Clone, Copy, Debug)]
-struct Note<E> {
+struct Next<E> {
     key: Key,
     event: E,
-    /// The next note of the page, or the next blank one.
-    next: Option<NoteId>,
+    /// The row that it stands for, or stands in, or one of the two below.
+    stands_for: u8,
 }
-/// Names a note: its index and one.
-type NoteId = core::num::NonZeroU32;
-
-/// Where a note is.
-const fn place(id: NoteId) -> usize {
-    id.get() as usize - 1
+impl<E> Next<E> {
+    const HEAP: u8 = Lane::ROWS as u8;
+    const ITSELF: u8 = Self::HEAP + 1;
 }
 
-/// The day of an event.
-const fn day(key: Key) -> i64 {
-    key.time().ticks() >> DAY_BITS
-}
-/// The page of a day.
-const fn page(day: i64) -> usize {
-    day as usize % YEAR
-}
-
-impl<E: Copy> Default for NearQueue<E> {
+impl<E: Copy + Default> Default for NearQueue<E> {
     fn default() -> Self {
         Self {
-            today: Vec::with_capacity(ROOM),
-            date: i64::MAX,
-            pages: Box::new([None; YEAR]),
-            marked: 0,
-            notes: Vec::with_capacity(ROOM),
-            blank: None,
-            later: BinaryHeap::with_capacity(ROOM),
+            stack: Vec::with_capacity(ROOM),
+            rows: core::array::from_fn(|_| Row::default()),
+            heap: BinaryHeap::with_capacity(ROOM),
+            heap_head: Key::NEVER,
             watch: Watch::default(),
         }
     }
 }
 impl<E: Copy> NearQueue<E> {
-    /// Steps from the next event before the search halves.
-    const STEPS: usize = 8;
-
-    /// Puts an event that is not the next of all at its place.
-    #[inline(never)]
-    fn put(&mut self, key: Key, event: E) {
-        if self.date < i64::MAX {
-            self.put_by_day(key, event);
+    /// Puts an event on the stack.
+    #[inline(always)]
+    fn stack(&mut self, next: Next<E>) {
+        if self.stack.last().is_none_or(|first| next.key < first.key) {
+            self.stack.push(next);
         } else {
-            self.put_among_few(key, event);
+            self.insert(next);
         }
     }
-    /// The same while today does not end.
+    /// The same below others.
     #[inline(never)]
-    fn put_among_few(&mut self, key: Key, event: E) {
-        if self.today.len() >= FEW {
-            self.spread_out();
-            return self.put_by_day(key, event);
-        }
-        self.today.push((key, event));
-        let mut place = self.today.len() - 1;
-        while place > 0 && self.today[place - 1].0 < key {
-            self.today[place] = self.today[place - 1];
+    fn insert(&mut self, next: Next<E>) {
+        let mut place = self.stack.len();
+        while place > 0 && self.stack[place - 1].key < next.key {
             place -= 1;
-        }
-        self.today[place] = (key, event);
-    }
-    /// The same once there are days.
-    #[inline(never)]
-    fn put_by_day(&mut self, key: Key, event: E) {
-        let day = day(key);
-        if day <= self.date {
-            self.insert(key, event);
-        } else if day - self.date < YEAR as i64 {
-            self.note(key, event);
-        } else {
-            self.put_later(key, event);
-        }
-    }
-    /// The same beyond the year.
-    #[cold]
-    fn put_later(&mut self, key: Key, event: E) {
-        self.later.push(Waiting { key, event });
-    }
-    /// From now on there are days and pages.
-    #[cold]
-    fn spread_out(&mut self) {
-        self.date = self.today.last().map_or(0, |&(next, _)| day(next));
-        let later = self.today.partition_point(|&(key, _)| day(key) > self.date);
-        for place in 0..later {
-            let (key, event) = self.today[place];
-            self.put_by_day(key, event);
-        }
-        self.today.drain(..later);
-    }
-    #[inline(never)]
-    fn insert(&mut self, key: Key, event: E) {
-        let len = self.today.len();
-        let mut place = len;
-        while place > 0 && self.today[place - 1].0 < key {
-            place -= 1;
-            if len - place == Self::STEPS {
-                place = self.today.partition_point(|&(waiting, _)| waiting > key);
+            if self.stack.len() - place == STEPS {
+                place = self.stack.partition_point(|waiting| waiting.key > next.key);
                 break;
             }
         }
-        self.today.insert(place, (key, event));
+        self.stack.insert(place, next);
     }
-
-    /// Notes an event on the page of its day.
-    fn note(&mut self, key: Key, event: E) {
-        let Some(id) = self.blank else { return self.note_anew(key, event) };
-        let page = page(day(key));
-        let note = &mut self.notes[place(id)];
-        self.blank = note.next;
-        *note = Note { key, event, next: self.pages[page] };
-        self.pages[page] = Some(id);
-        self.marked |= 1 << page;
-    }
-
-    /// The same where no note can be written over.
-    #[cold]
-    fn note_anew(&mut self, key: Key, event: E) {
-        self.notes.push(Note { key, event, next: None });
-        self.blank = NoteId::new(self.notes.len() as u32);
-        self.note(key, event);
-    }
-
-    /// The next day with a note.
-    fn next_noted(&self) -> Option<i64> {
-        if self.marked == 0 {
-            return None;
-        }
-        let tomorrow = self.date + 1;
-        let ahead = self.marked.rotate_right(page(tomorrow) as u32).trailing_zeros();
-        Some(tomorrow + i64::from(ahead))
-    }
-
-    /// The list of today is empty: goes on to the next day that has something. Not before the next event is asked for,
-    /// because what is pushed until then may come earlier.
+    /// Puts an event into a row, not behind the last one.
     #[inline(never)]
-    fn turn(&mut self) {
-        let noted = self.next_noted();
-        let later = self.later.peek().map(|waiting| day(waiting.key));
-        let Some(date) = noted.into_iter().chain(later).min() else { return };
-        self.date = date;
-        if noted == Some(date) {
-            self.take_page(page(date));
+    fn push_out_of_turn(&mut self, row: usize, key: Key, event: E) {
+        let next = Next { key, event, stands_for: row as u8 };
+        match self.rows[row].squeeze_in(next) {
+            Squeezed::In => {}
+            Squeezed::First => self.insert(next),
+            Squeezed::Out => self.insert(Next { stands_for: Next::<E>::ITSELF, ..next }),
         }
-        while self.later.peek().is_some_and(|waiting| day(waiting.key) == date) {
-            self.today.extend(self.later.pop().map(|Waiting { key, event }| (key, event)));
-        }
-        self.today.sort_unstable_by(|(a, _), (b, _)| b.cmp(a));
     }
-    fn take_page(&mut self, page: usize) {
-        let first = self.pages[page].take();
-        self.marked &= !(1 << page);
-        let (mut next, mut last) = (first, None);
-        while let Some(id) = next {
-            let note = &self.notes[place(id)];
-            self.today.push((note.key, note.event));
-            (next, last) = (note.next, Some(id));
+    #[cold]
+    fn push_any(&mut self, key: Key, event: E) {
+        if key > self.heap_head {
+            return self.heap.push(Waiting { key, event });
         }
-        // All of them can be written over, before those that could be already.
-        if let Some(last) = last {
-            self.notes[place(last)].next = self.blank;
-            self.blank = first;
+        let mut stands_for = Next::<E>::ITSELF;
+        if self.heap_head == Key::NEVER {
+            (self.heap_head, stands_for) = (key, Next::<E>::HEAP);
+        }
+        self.insert(Next { key, event, stands_for });
+    }
+    /// The event that stood for a row, or for the heap, is taken: the one behind it follows.
+    #[inline(never)]
+    fn follow(&mut self, stands_for: u8) {
+        let Some(row) = self.rows.get_mut(usize::from(stands_for)) else { return self.follow_in_heap() };
+        if row.begin == row.end {
+            row.last = Key::NEVER;
+            return;
+        }
+        let next = row.ring[usize::from(row.begin)];
+        row.begin = row.begin.wrapping_add(1);
+        row.first = next.key;
+        self.stack(next);
+    }
+    #[cold]
+    fn follow_in_heap(&mut self) {
+        let next = self.heap.pop();
+        self.heap_head = next.map_or(Key::NEVER, |waiting| waiting.key);
+        if let Some(Waiting { key, event }) = next {
+            self.insert(Next { key, event, stands_for: Next::<E>::HEAP });
         }
     }
 }
-impl<E: Copy> Queue<E> for NearQueue<E> {
-    #[inline]
-    fn push(&mut self, key: Key, event: E) {
-        if day(key) <= self.date && self.today.last().is_none_or(|&(next, _)| key < next) {
-            self.today.push((key, event));
-        } else {
-            self.put(key, event);
+impl<E: Copy + Default> Queue<E> for NearQueue<E> {
+    #[inline(always)]
+    fn push(&mut self, lane: Lane, key: Key, event: E) {
+        match lane {
+            Lane::Soon => self.stack(Next { key, event, stands_for: Next::<E>::ITSELF }),
+            Lane::Row(row) => {
+                if !self.rows[row].push(Next { key, event, stands_for: row as u8 }) {
+                    self.push_out_of_turn(row, key, event);
+                }
+            }
+            Lane::Any => self.push_any(key, event),
         }
     }
-    #[inline]
-    fn peek(&mut self) -> Option<Key> {
-        if self.today.is_empty() {
-            self.turn();
-        }
-        self.today.last().map(|&(key, _)| key)
+    #[inline(always)]
+    fn peek(&self) -> Option<Key> {
+        self.stack.last().map(|next| next.key)
     }
-    #[inline]
+    #[inline(always)]
     fn take(&mut self) -> (Key, E) {
-        if self.today.is_empty() {
-            self.turn();
+        let &Next { key, event, stands_for } = self.stack.last().expect("an event waits");
+        self.stack.pop();
+        if stands_for != Next::<E>::ITSELF {
+            self.follow(stands_for);
         }
-        let &(key, event) = self.today.last().expect("an event waits");
-        self.today.pop();
         self.watch.pass(key);
         (key, event)
     }
     fn len(&self) -> usize {
-        let blank = core::iter::successors(self.blank, |&id| self.notes[place(id)].next);
-        self.today.len() + self.notes.len() - blank.count() + self.later.len()
+        self.stack.len() + self.rows.iter().map(Row::len).sum::<usize>() + self.heap.len()
     }
     fn is_empty(&self) -> bool {
-        self.today.is_empty() && self.marked == 0 && self.later.is_empty()
+        self.stack.is_empty()
+    }
+}
+
+/// Events that come, nearly always, in the order in which they are pushed. The first one is not here but on the stack.
+#[derive(Clone, Debug)]
+struct Row<E> {
+    /// A ring, ascending from `begin` to `end`.
+    ring: Box<[Next<E>; ROOM]>,
+    begin: u8,
+    end: u8,
+    /// Key of the event on the stack.
+    first: Key,
+    /// Key of the last one; [`Key::NEVER`] where no event stands for the row.
+    last: Key,
+}
+
+/// Where an event goes that is not the last one of a row.
+enum Squeezed {
+    /// It is in the row.
+    In,
+    /// It stands for the row from now on.
+    First,
+    /// It comes before the row, or there is no room for it.
+    Out,
+}
+
+impl<E: Copy + Default> Default for Row<E> {
+    fn default() -> Self {
+        let ring = Box::new([Next { key: Key::NEVER, event: E::default(), stands_for: 0 }; ROOM]);
+        Self { ring, begin: 0, end: 0, first: Key::NEVER, last: Key::NEVER }
+    }
+}
+impl<E: Copy> Row<E> {
+    const fn len(&self) -> usize {
+        self.end.wrapping_sub(self.begin) as usize
+    }
+    const fn is_full(&self) -> bool {
+        self.end.wrapping_add(1) == self.begin
+    }
+    /// Puts an event behind all others. False, and nothing is done, where it does not belong there.
+    #[inline(always)]
+    fn push(&mut self, next: Next<E>) -> bool {
+        let is_last = next.key > self.last && !self.is_full();
+        if is_last {
+            self.ring[usize::from(self.end)] = next;
+            self.end = self.end.wrapping_add(1);
+            self.last = next.key;
+        }
+        is_last
+    }
+    fn squeeze_in(&mut self, next: Next<E>) -> Squeezed {
+        let key = next.key;
+        if self.last == Key::NEVER {
+            (self.first, self.last) = (key, key);
+            return Squeezed::First;
+        }
+        if key < self.first || self.is_full() {
+            return Squeezed::Out;
+        }
+        let mut place = self.end;
+        while place != self.begin {
+            let before = place.wrapping_sub(1);
+            let waiting = self.ring[usize::from(before)];
+            if waiting.key < key {
+                break;
+            }
+            self.ring[usize::from(place)] = waiting;
+            place = before;
+        }
+        self.ring[usize::from(place)] = next;
+        self.end = self.end.wrapping_add(1);
+        self.last = self.last.max(key);
+        Squeezed::In
     }
 }
 
@@ -460,9 +463,9 @@ mod tests {
     }
 
     fn into_the_past(mut queue: impl Queue<()>) {
-        queue.push(key(10), ());
+        queue.push(Lane::Any, key(10), ());
         queue.pop();
-        queue.push(key(9), ());
+        queue.push(Lane::Any, key(9), ());
         queue.pop();
     }
     #[test]
@@ -476,32 +479,34 @@ mod tests {
         into_the_past(HeapQueue::default());
     }
 
+    const LANES: &[Lane] = &[Lane::Soon, Lane::Row(0), Lane::Row(1), Lane::Row(2), Lane::Any];
+
     /// Pushes and pops, the queue against a list that is sorted for each pop.
-    fn follows<Q: Queue<u64>>(script: &[(i64, u8, u8, bool)]) {
+    fn follows<Q: Queue<u64>>(script: &[(i64, u8, (u8, Lane), bool)]) {
         let (mut queue, mut list, mut now) = (Q::default(), Vec::new(), 0);
-        let pop = |queue: &mut Q, list: &mut Vec<(Key, u64)>| {
+        let pop = |queue: &mut Q, list: &mut Vec<(Key, u64)>, lane: Lane| {
             list.sort_unstable_by_key(|&(key, _)| key);
             let first = (!list.is_empty()).then(|| list.remove(0));
             assert_eq!(queue.peek(), first.map(|(key, _)| key));
             if let Some((key, event)) = first {
                 assert_eq!(queue.take(), (key, event));
-                queue.push(key, event);
+                queue.push(lane, key, event);
             }
             assert_eq!(queue.pop(), first);
             assert_eq!((queue.len(), queue.is_empty()), (list.len(), list.is_empty()));
             first.map_or(0, |(key, _)| key.time().ticks())
         };
-        for (number, &(ahead, phase, station, take)) in (0..).zip(script) {
+        for (number, &(ahead, phase, (station, lane), take)) in (0..).zip(script) {
             let phase = Phase::ALL[usize::from(phase)];
             let key = Key::new(Time::from_ticks(now + ahead), phase, station, number);
-            queue.push(key, number);
+            queue.push(lane, key, number);
             list.push((key, number));
             if take {
-                now = pop(&mut queue, &mut list);
+                now = pop(&mut queue, &mut list, lane);
             }
         }
         while !queue.is_empty() {
-            pop(&mut queue, &mut list);
+            pop(&mut queue, &mut list, Lane::Any);
         }
         assert!(list.is_empty() && queue.peek().is_none() && queue.pop().is_none());
     }
@@ -509,7 +514,7 @@ mod tests {
     proptest! {
         #[test]
         fn both_queues_pop_in_the_order_of_the_keys(
-            script in prop::collection::vec((prop_oneof![0i64..4, 0i64..1_000, 0i64..1 << 23, 0i64..1 << 31], 0u8..5, 0u8..3, prop::bool::weighted(0.4)), 0..200),
+            script in prop::collection::vec((prop_oneof![0i64..4, 0i64..1_000, 0i64..1 << 23, 0i64..1 << 31], 0u8..5, (0u8..3, prop::sample::select(LANES)), prop::bool::weighted(0.4)), 0..200),
         ) {
             follows::<NearQueue<u64>>(&script);
             follows::<HeapQueue<u64>>(&script);
@@ -518,12 +523,13 @@ mod tests {
 
     #[test]
     fn both_queues_agree_on_a_long_bus_cycle() {
-        // Far deadlines for every station, then chains of near events: the shape of a real run.
+        // Far deadlines for every station, some out of turn, then chains of near events: the shape of a real run.
         let mut script = Vec::new();
         for cycle in 0..40 {
-            script.extend((0..120).map(|station| (1_000 + cycle, 3, station, false)));
-            script.extend((0..120).map(|station| (i64::from(station) % 3, 4, station, true)));
-            script.extend((0..120).map(|station| (0, 0, station, true)));
+            script.extend((0..120).map(|station| (1_000 + cycle, 3, (station, Lane::Row(0)), false)));
+            script.extend((0..120).map(|station| (2_000 - i64::from(station % 17), 3, (station, Lane::Row(1)), false)));
+            script.extend((0..120).map(|station| (i64::from(station) % 3, 4, (station, Lane::Soon), true)));
+            script.extend((0..120).map(|station| (0, 0, (station, Lane::Soon), true)));
         }
         follows::<NearQueue<u64>>(&script);
         follows::<HeapQueue<u64>>(&script);
