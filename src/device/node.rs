@@ -70,11 +70,22 @@ impl Station for Node {
     }
     fn step(&mut self, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
         match self {
+            // The many, and who speaks with each of them.
             Self::Encoder(encoder) => encoder.take(now, input, out),
-            Self::Drive(drive) => drive.take(now, input, out),
             Self::Master(master) => step_master(master, now, input, out),
+            _ => self.step_other(now, input, out),
+        }
+    }
+}
+
+impl Node {
+    /// A step of what is neither an encoder nor a class 1 master.
+    #[inline(never)]
+    fn step_other(&mut self, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
+        match self {
+            Self::Drive(drive) => drive.take(now, input, out),
             Self::Class2(master) => step_class2(master, now, input, out),
-            Self::Silent(_) => {}
+            Self::Encoder(_) | Self::Master(_) | Self::Silent(_) => {}
         }
     }
 }
@@ -96,9 +107,13 @@ impl From<Command> for Order<ControllerCommand> {
 #[inline(never)]
 fn step_master(master: &mut Master<Controller>, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
     match input {
-        Input::Command(command) => master.order(command.into(), out),
+        Input::Command(command) => order_master(master, command, out),
         input => master.take(now, input, out),
     }
+}
+#[cold]
+fn order_master(master: &mut Master<Controller>, command: Command, out: &mut Outbox) {
+    master.order(command.into(), out);
 }
 #[inline(never)]
 fn step_class2(master: &mut Class2<Tool>, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
