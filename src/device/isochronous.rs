@@ -11,8 +11,11 @@
 //! | Operation | too many wrong signs of life | MasterLife, fault 0F02 |
 //! | any | end of data exchange | Configuration |
 
+// What follows a SYNCH runs once per slave-cycle: each call would save and fetch all registers again.
+#![allow(clippy::inline_always)]
+
 use crate::device::options::{LifeStart, UnitOptions};
-use crate::device::pll::{Change, Pll, PllSettings};
+use crate::device::pll::{Change, Judgement, Pll, PllSettings};
 use crate::device::sign_of_life::{Counter, Monitor, MonitorSettings, Verdict};
 use crate::fdl::{Outbox, Timer};
 use crate::observation::{ClockVerdict, LifeState, Observation, Phase, PllState};
@@ -117,33 +120,35 @@ impl Isochronous {
     /// A valid Data_Exchange came: with Operate this starts the clock recovery (manual 2.1.2).
     #[inline]
     pub fn exchanged(&mut self, out: &mut Outbox) {
-        if self.phase == Phase::Configuration && self.operate {
-            self.start(out);
+        if self.phase == Phase::Configuration {
+            self.configured(out);
         }
     }
     #[cold]
-    fn start(&mut self, out: &mut Outbox) {
-        self.pll.start();
-        self.observe_pll(PllState::Idle, out);
-        self.enter_phase(Phase::Clock, out);
+    fn configured(&mut self, out: &mut Outbox) {
+        if self.operate {
+            self.pll.start();
+            self.observe_pll(PllState::Idle, out);
+            self.enter_phase(Phase::Clock, out);
+        }
     }
 
     /// SYNCH arrived. Returns the fault that this makes.
+    #[inline(always)]
     pub fn synch(&mut self, now: Local, out: &mut Outbox) -> Option<SensorFault> {
-        self.judge(Edge::Synch, now, out)
+        let before = self.pll.state();
+        let judgement = self.pll.synch(now)?;
+        self.judged(before, judgement, out)
     }
     /// [`Timer::Window`] came due. Returns the fault that this makes.
     #[cold]
     pub fn window_closed(&mut self, now: Local, out: &mut Outbox) -> Option<SensorFault> {
-        self.judge(Edge::WindowEnd, now, out)
-    }
-    #[inline(never)]
-    fn judge(&mut self, edge: Edge, now: Local, out: &mut Outbox) -> Option<SensorFault> {
         let before = self.pll.state();
-        let judgement = match edge {
-            Edge::Synch => self.pll.synch(now)?,
-            Edge::WindowEnd => self.pll.window_closed(now)?,
-        };
+        let judgement = self.pll.window_closed(now)?;
+        self.judged(before, judgement, out)
+    }
+    #[inline(always)]
+    fn judged(&mut self, before: PllState, judgement: Judgement, out: &mut Outbox) -> Option<SensorFault> {
         out.observe(Observation::Clock {
             verdict: judgement.verdict,
             error: judgement.error,
@@ -181,6 +186,7 @@ impl Isochronous {
         }
     }
     /// T_O and the latch of the running cycle, once its start is known.
+    #[inline(always)]
     fn plan_cycle(&mut self, out: &mut Outbox) {
         if let (true, Some(edge), Some(next)) = (self.pll.is_locked(), self.pll.edge(), self.pll.next_edge()) {
             out.arm(Timer::SetPoint, edge + self.settings.t_o);
@@ -247,13 +253,6 @@ impl Isochronous {
             out.observe(Observation::MasterLife { from, to });
         }
     }
-}
-
-/// What the clock recovery is told of.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Edge {
-    Synch,
-    WindowEnd,
 }
 
 /// T_O and the latch run no more.

@@ -205,7 +205,7 @@ impl<F: Function> Unit<F> {
         match input {
             Input::Telegram(heard) => self.heard(now, heard, out),
             Input::Deadline { timer: Timer::SetPoint, .. } => self.body.set_point(now, out),
-            Input::Sample(raw) if self.slave.state() == SlaveState::DataExch => self.body.latch(raw, true, out),
+            Input::Sample(raw) => self.sampled(raw, out),
             _ => self.take_seldom(now, input, out),
         }
     }
@@ -216,6 +216,12 @@ impl<F: Function> Unit<F> {
             Input::PowerOn => self.power_on(now, out),
             Input::Deadline { timer, .. } => self.due(now, timer, out),
             Input::Telegram(_) | Input::Sent | Input::Sample(_) | Input::Command(_) => {}
+        }
+    }
+    #[inline(never)]
+    fn sampled(&mut self, raw: u32, out: &mut Outbox) {
+        if self.slave.state() == SlaveState::DataExch {
+            self.body.latch(raw, true, out);
         }
     }
     fn power_on(&mut self, now: Local, out: &mut Outbox) {

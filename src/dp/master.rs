@@ -271,9 +271,11 @@ impl<A: Application> Master<A> {
 
     #[inline]
     fn confirmed(&mut self, now: Local, confirm: Confirm<'_>, out: &mut Outbox) {
-        if let (&Part::Exchange(slave), &Confirm::Reply { status, du }) = (&self.part, &confirm) {
+        if let Part::Exchange(slave) = self.part
+            && let Confirm::Reply { status, du } = confirm
+        {
             self.exchange_answered(now, slave, (status, du), out);
-            self.exchange(now, slave + 1, out);
+            self.exchange_next(now, slave + 1, out);
         } else {
             self.confirmed_other(now, confirm, out);
         }
@@ -357,11 +359,18 @@ impl<A: Application> Master<A> {
     }
 
     /// Data_Exchange with the first slave from index `from` on that takes part.
+    #[inline(never)]
     fn exchange(&mut self, now: Local, from: usize, out: &mut Outbox) {
+        self.exchange_next(now, from, out);
+    }
+    /// As [`exchange`](Self::exchange), behind the answer of the slave before: there all registers are saved already.
+    #[allow(clippy::inline_always)] // Once per slave-cycle.
+    #[inline(always)]
+    fn exchange_next(&mut self, now: Local, from: usize, out: &mut Outbox) {
         let Some(slave) = (from..self.handlers.len()).find(|&slave| self.handlers[slave].exchanges()) else {
             return self.exchange_done(out);
         };
-        if self.stops_before(slave, now, out) {
+        if self.is_free() && self.stops_before(slave, now, out) {
             return;
         }
         self.exchanged = true;

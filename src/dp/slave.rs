@@ -239,8 +239,9 @@ impl Slave {
 
     /// Takes a telegram whose last bit arrived at `now`.
     pub fn heard(&mut self, now: Local, heard: Heard<'_>, app: &mut impl Application, out: &mut Outbox) {
-        let Ok(telegram) = Telegram::parse(heard.octets) else { return };
-        match self.passive.heard(now, &telegram, out) {
+        let parsed = Telegram::parse(heard.octets);
+        let Ok(telegram) = &parsed else { return };
+        match self.passive.heard(now, telegram, out) {
             Indication::Nothing => {}
             Indication::Request { header, du } => {
                 if self.master == Some(header.sa) {

@@ -33,6 +33,9 @@
 //! the active station of profirust has it. Model: a station that found others by listening, or entered a ring, scans
 //! its whole GAP once, an address at every token visit, before it keeps to G.
 
+// A request and its answer come once per slave-cycle: each call would save and fetch all registers again.
+#![allow(clippy::inline_always)]
+
 mod token;
 
 use crate::fdl::params::BusParams;
@@ -315,6 +318,7 @@ impl Active {
     ///
     /// # Panics
     /// While another answer is awaited, or above 246 octets: bugs of the caller.
+    #[inline(always)]
     pub fn request(
         &mut self,
         at: Local,
@@ -343,11 +347,12 @@ impl Active {
     }
 
     /// Takes a telegram whose last bit arrived at `now`.
-    #[inline]
+    #[inline(always)]
     pub fn heard<'a>(&mut self, now: Local, heard: Heard<'a>, out: &mut Outbox) -> Confirm<'a> {
         let telegram = Telegram::parse(heard.octets);
         // Nearly all that is heard: the answer that was asked for.
-        if let (&State::AwaitDataResponse(awaited), Ok(Telegram::Data { header, du })) = (&self.state, &telegram)
+        if let State::AwaitDataResponse(awaited) = self.state
+            && let Ok(Telegram::Data { header, du }) = &telegram
             && let Some(status) = self.answer(now, awaited, header)
         {
             self.operational(now, awaited.from, out);
@@ -370,7 +375,9 @@ impl Active {
     fn operational(&mut self, now: Local, from: Address, out: &mut Outbox) {
         self.goes_on(now, out);
         let peer = &mut self.peers[usize::from(from.get())];
-        *peer = Peer { fcb: peer.fcb.next(), operational: true };
+        let counted = matches!(peer.fcb, Fcb::Alternate(_));
+        let fcb = if counted { peer.fcb.next() } else { next_of_first(peer.fcb) };
+        *peer = Peer { fcb, operational: true };
     }
     /// Takes anything else that was heard.
     #[cold]
@@ -476,6 +483,12 @@ impl Active {
         self.reset_peer(awaited.from);
         Confirm::NoReply
     }
+}
+
+/// The count after a request with FCV = 0.
+#[cold]
+const fn next_of_first(fcb: Fcb) -> Fcb {
+    fcb.next()
 }
 
 const fn gap_answer(station: StationType) -> GapAnswer {
