@@ -57,7 +57,7 @@ use crate::fdl::{Filter, Heard, Input, Outbox, Station, Timer};
 use crate::observation::{HandlerState, MasterClass, MasterMode, Observation};
 use crate::time::{Local, Span};
 use crate::wire::control::GlobalControl;
-use crate::wire::{Address, Frame, Service, Status};
+use crate::wire::{Address, Frame, Service, Status, Telegram};
 
 /// Characters of a Global_Control telegram.
 const GC_OCTETS: usize = 13;
@@ -269,20 +269,9 @@ impl<A: Application> Master<A> {
         self.active.power_on(now, out);
     }
 
-    #[inline]
-    fn confirmed(&mut self, now: Local, confirm: Confirm<'_>, out: &mut Outbox) {
-        if let Part::Exchange(slave) = self.part
-            && let Confirm::Reply { status, du } = confirm
-        {
-            self.exchange_answered(now, slave, (status, du), out);
-            self.exchange_next(now, slave + 1, out);
-        } else {
-            self.confirmed_other(now, confirm, out);
-        }
-    }
-    /// What is no reply to Data_Exchange.
+    /// Goes on after whatever is no reply to Data_Exchange.
     #[cold]
-    fn confirmed_other(&mut self, now: Local, confirm: Confirm<'_>, out: &mut Outbox) {
+    fn confirmed(&mut self, now: Local, confirm: Confirm<'_>, out: &mut Outbox) {
         match (self.part, confirm) {
             (_, Confirm::Nothing) => {}
             (_, Confirm::TokenHeld) => self.token_held(now, out),
@@ -359,14 +348,7 @@ impl<A: Application> Master<A> {
     }
 
     /// Data_Exchange with the first slave from index `from` on that takes part.
-    #[inline(never)]
     fn exchange(&mut self, now: Local, from: usize, out: &mut Outbox) {
-        self.exchange_next(now, from, out);
-    }
-    /// As [`exchange`](Self::exchange), behind the answer of the slave before: there all registers are saved already.
-    #[allow(clippy::inline_always)] // Once per slave-cycle.
-    #[inline(always)]
-    fn exchange_next(&mut self, now: Local, from: usize, out: &mut Outbox) {
         let Some(slave) = (from..self.handlers.len()).find(|&slave| self.handlers[slave].exchanges()) else {
             return self.exchange_done(out);
         };
@@ -620,8 +602,20 @@ impl<A: Application> Master<A> {
     }
     #[inline(never)]
     fn heard(&mut self, now: Local, heard: Heard<'_>, out: &mut Outbox) {
-        let confirm = self.active.heard(now, heard, out);
-        self.confirmed(now, confirm, out);
+        let parsed = Telegram::parse(heard.octets);
+        if let Ok(telegram) = &parsed
+            && let Some((status, du)) = self.active.replied(now, telegram, out)
+        {
+            if let Part::Exchange(slave) = self.part {
+                self.exchange_answered(now, slave, (status, du), out);
+                self.exchange(now, slave + 1, out);
+            } else {
+                self.confirmed(now, Confirm::Reply { status, du }, out);
+            }
+        } else {
+            let confirm = self.active.heard_other(now, parsed.as_ref().ok(), out);
+            self.confirmed(now, confirm, out);
+        }
     }
     /// Takes what is no telegram.
     #[inline(never)]
@@ -632,7 +626,7 @@ impl<A: Application> Master<A> {
             Input::Sent if self.bereft => self.cycle_begins(now, out),
             Input::Deadline { timer: Timer::Slot, busy } => {
                 let confirm = self.active.slot_over(now, busy, out);
-                self.confirmed_other(now, confirm, out);
+                self.confirmed(now, confirm, out);
             }
             Input::Deadline { timer: Timer::Schedule, .. } => self.scheduled(now, out),
             Input::Telegram(_) | Input::Sent | Input::Deadline { .. } | Input::Sample(_) | Input::Command(_) => {}

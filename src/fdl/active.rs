@@ -347,18 +347,24 @@ impl Active {
     }
 
     /// Takes a telegram whose last bit arrived at `now`.
-    #[inline(always)]
     pub fn heard<'a>(&mut self, now: Local, heard: Heard<'a>, out: &mut Outbox) -> Confirm<'a> {
-        let telegram = Telegram::parse(heard.octets);
-        // Nearly all that is heard: the answer that was asked for.
+        let telegram = Telegram::parse(heard.octets).ok();
+        match telegram.and_then(|telegram| self.replied(now, &telegram, out)) {
+            Some((status, du)) => Confirm::Reply { status, du },
+            None => self.heard_other(now, telegram.as_ref(), out),
+        }
+    }
+    /// The first half of [`heard`](Self::heard): a reply to the request, which is nearly all that is heard.
+    #[inline(always)]
+    pub fn replied<'a>(&mut self, now: Local, telegram: &Telegram<'a>, out: &mut Outbox) -> Option<(Status, &'a [u8])> {
         if let State::AwaitDataResponse(awaited) = self.state
-            && let Ok(Telegram::Data { header, du }) = &telegram
+            && let Telegram::Data { header, du } = telegram
             && let Some(status) = self.answer(now, awaited, header)
         {
             self.operational(now, awaited.from, out);
-            return Confirm::Reply { status, du };
+            return Some((status, du));
         }
-        self.heard_other(now, telegram.as_ref().ok(), out)
+        None
     }
     /// What a telegram with data means for the request, where it answers that: not before the request has left, and not
     /// as if it came from this very station.
@@ -379,9 +385,9 @@ impl Active {
         let fcb = if counted { peer.fcb.next() } else { next_of_first(peer.fcb) };
         *peer = Peer { fcb, operational: true };
     }
-    /// Takes anything else that was heard.
+    /// The second half of [`heard`](Self::heard): anything else that was heard, nothing for a broken telegram.
     #[cold]
-    fn heard_other(&mut self, now: Local, telegram: Option<&Telegram<'_>>, out: &mut Outbox) -> Confirm<'static> {
+    pub fn heard_other(&mut self, now: Local, telegram: Option<&Telegram<'_>>, out: &mut Outbox) -> Confirm<'static> {
         match self.state {
             State::ListenToken { conflicts } => self.listens(now, conflicts, telegram.copied(), out),
             State::ActiveIdle { skipped } => self.idles(now, skipped, telegram.copied(), out),

@@ -66,6 +66,14 @@ struct Memory {
     reply: Frame,
 }
 
+impl Memory {
+    /// Whether the request that is kept is this master's and was answered.
+    #[cold]
+    fn has_replied_to(&self, master: Address) -> bool {
+        self.request.is_some_and(|(of, _)| of == master) && !self.reply.is_empty()
+    }
+}
+
 impl Passive {
     /// A station at `address` that needs `own_tsdr` to answer.
     pub fn new(address: Address, rate: BitRate, own_tsdr: Tbit) -> Self {
@@ -121,11 +129,10 @@ impl Passive {
     fn is_repeated(&mut self, master: Address, fcb: Fcb) -> bool {
         self.memory.request = match fcb {
             Fcb::Alternate(bit) => {
-                let request = Some((master, bit));
-                if self.memory.request == request && !self.memory.reply.is_empty() {
+                if self.memory.request.is_some_and(|(_, last)| last == bit) && self.memory.has_replied_to(master) {
                     return true;
                 }
-                request
+                Some((master, bit))
             }
             fcb => uncounted(master, fcb),
         };
