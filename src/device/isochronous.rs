@@ -11,6 +11,9 @@
 //! | Operation | too many wrong signs of life | MasterLife, fault 0F02 |
 //! | any | end of data exchange | Configuration |
 
+// What follows a SYNCH runs once per slave-cycle: each call would save and fetch all registers again.
+#![allow(clippy::inline_always)]
+
 use crate::device::options::{LifeStart, UnitOptions};
 use crate::device::pll::{Change, Judgement, Pll, PllSettings};
 use crate::device::sign_of_life::{Counter, Monitor, MonitorSettings, Verdict};
@@ -115,8 +118,15 @@ impl Isochronous {
         self.operate = operate;
     }
     /// A valid Data_Exchange came: with Operate this starts the clock recovery (manual 2.1.2).
+    #[inline]
     pub fn exchanged(&mut self, out: &mut Outbox) {
-        if self.phase == Phase::Configuration && self.operate {
+        if self.phase == Phase::Configuration {
+            self.configured(out);
+        }
+    }
+    #[cold]
+    fn configured(&mut self, out: &mut Outbox) {
+        if self.operate {
             self.pll.start();
             self.observe_pll(PllState::Idle, out);
             self.enter_phase(Phase::Clock, out);
@@ -124,17 +134,20 @@ impl Isochronous {
     }
 
     /// SYNCH arrived. Returns the fault that this makes.
+    #[inline(always)]
     pub fn synch(&mut self, now: Local, out: &mut Outbox) -> Option<SensorFault> {
         let before = self.pll.state();
         let judgement = self.pll.synch(now)?;
         self.judged(before, judgement, out)
     }
     /// [`Timer::Window`] came due. Returns the fault that this makes.
+    #[cold]
     pub fn window_closed(&mut self, now: Local, out: &mut Outbox) -> Option<SensorFault> {
         let before = self.pll.state();
         let judgement = self.pll.window_closed(now)?;
         self.judged(before, judgement, out)
     }
+    #[inline(always)]
     fn judged(&mut self, before: PllState, judgement: Judgement, out: &mut Outbox) -> Option<SensorFault> {
         out.observe(Observation::Clock {
             verdict: judgement.verdict,
@@ -143,29 +156,37 @@ impl Isochronous {
             window: self.pll.window(),
             counter: judgement.counter,
         });
-        self.observe_pll(before, out);
+        if self.pll.state() != before {
+            self.observe_pll(before, out);
+        }
         match self.pll.window_end() {
             Some(end) => out.arm(Timer::Window, end),
             None => out.disarm(Timer::Window),
         }
-        match judgement.change {
-            Change::Locked => {
-                out.sample_with_telegrams(false);
-                self.enter_phase(Phase::MasterLife, out);
-            }
-            Change::Lost => {
-                self.lost(out);
-                return Some(SensorFault::Clock);
-            }
-            Change::None | Change::Restarted => {}
-        }
+        let fault = if judgement.change == Change::None { None } else { self.changed(judgement.change, out) };
         // A stray SYNCH belongs to a cycle that is planned already.
         if judgement.verdict != ClockVerdict::Stray {
             self.plan_cycle(out);
         }
-        None
+        fault
+    }
+    #[cold]
+    fn changed(&mut self, change: Change, out: &mut Outbox) -> Option<SensorFault> {
+        match change {
+            Change::Locked => {
+                out.sample_with_telegrams(false);
+                self.enter_phase(Phase::MasterLife, out);
+                None
+            }
+            Change::Lost => {
+                self.lost(out);
+                Some(SensorFault::Clock)
+            }
+            Change::None | Change::Restarted => None,
+        }
     }
     /// T_O and the latch of the running cycle, once its start is known.
+    #[inline(always)]
     fn plan_cycle(&mut self, out: &mut Outbox) {
         if let (true, Some(edge), Some(next)) = (self.pll.is_locked(), self.pll.edge(), self.pll.next_edge()) {
             out.arm(Timer::SetPoint, edge + self.settings.t_o);
@@ -184,6 +205,7 @@ impl Isochronous {
     }
 
     /// T_O: compares the master's sign of life. Returns the fault that this makes.
+    #[inline]
     pub fn set_point(&mut self, mls: u8, out: &mut Outbox) -> Option<SensorFault> {
         let before = self.life.state();
         let step = self.life.cycle(mls);
@@ -195,16 +217,21 @@ impl Isochronous {
             counter: self.life.failures().min(u16::MAX.into()) as u16,
             expected: !matches!(step.verdict, Verdict::Wrong { .. }),
         });
-        self.observe_life(before, out);
-        self.enter_phase(
-            match self.life.state() {
-                LifeState::Waiting | LifeState::Strict => Phase::MasterLife,
-                LifeState::Confirming => Phase::SlaveLife,
-                LifeState::Operating => Phase::Operation,
-            },
-            out,
-        );
+        if step.entered.is_some() {
+            self.life_changed(before, out);
+        }
         step.tripped.then_some(SensorFault::LifeSign)
+    }
+    /// The start-up goes on, or begins anew. While the monitor's state stays, so does the phase that it stands for.
+    #[cold]
+    fn life_changed(&mut self, before: LifeState, out: &mut Outbox) {
+        self.observe_life(before, out);
+        let phase = match self.life.state() {
+            LifeState::Waiting | LifeState::Strict => Phase::MasterLife,
+            LifeState::Confirming => Phase::SlaveLife,
+            LifeState::Operating => Phase::Operation,
+        };
+        self.enter_phase(phase, out);
     }
 
     fn enter_phase(&mut self, to: Phase, out: &mut Outbox) {
@@ -213,6 +240,7 @@ impl Isochronous {
             out.observe(Observation::Phase { from, to });
         }
     }
+    #[cold]
     fn observe_pll(&self, from: PllState, out: &mut Outbox) {
         let to = self.pll.state();
         if from != to {

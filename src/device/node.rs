@@ -69,12 +69,24 @@ impl Station for Node {
         }
     }
     fn step(&mut self, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
+        // The many first, by one test.
+        if let Self::Encoder(encoder) = self {
+            encoder.take(now, input, out);
+        } else {
+            self.step_other(now, input, out);
+        }
+    }
+}
+
+impl Node {
+    /// A step of what is no encoder.
+    #[inline(never)]
+    fn step_other(&mut self, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
         match self {
-            Self::Encoder(encoder) => encoder.take(now, input, out),
-            Self::Drive(drive) => drive.take(now, input, out),
             Self::Master(master) => step_master(master, now, input, out),
+            Self::Drive(drive) => drive.take(now, input, out),
             Self::Class2(master) => step_class2(master, now, input, out),
-            Self::Silent(_) => {}
+            Self::Encoder(_) | Self::Silent(_) => {}
         }
     }
 }
@@ -92,14 +104,18 @@ impl From<Command> for Order<ControllerCommand> {
     }
 }
 
-// Neither master is inlined: a step of the many encoders then saves no registers for what their commands are made of.
-#[inline(never)]
 fn step_master(master: &mut Master<Controller>, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
     match input {
-        Input::Command(command) => master.order(command.into(), out),
+        Input::Command(command) => order_master(master, command, out),
         input => master.take(now, input, out),
     }
 }
+#[cold]
+#[inline(never)]
+fn order_master(master: &mut Master<Controller>, command: Command, out: &mut Outbox) {
+    master.order(command.into(), out);
+}
+// Not inlined: a step of the others then saves no registers for what commands are made of.
 #[inline(never)]
 fn step_class2(master: &mut Class2<Tool>, now: Local, input: Input<'_, Command>, out: &mut Outbox) {
     let input = input.map_command(|command| match command {

@@ -205,13 +205,25 @@ impl<F: Function> Unit<F> {
         match input {
             Input::Telegram(heard) => self.heard(now, heard, out),
             Input::Deadline { timer: Timer::SetPoint, .. } => self.body.set_point(now, out),
-            Input::Sample(raw) if self.slave.state() == SlaveState::DataExch => self.body.latch(raw, true, out),
-            Input::PowerOn => self.power_on(now, out),
-            Input::Deadline { timer, .. } => self.due(now, timer, out),
-            Input::Sent | Input::Sample(_) | Input::Command(_) => {}
+            Input::Sample(raw) => self.sampled(raw, out),
+            _ => self.take_seldom(now, input, out),
         }
     }
+    /// Takes what does not come in every cycle.
     #[cold]
+    fn take_seldom<C: Copy>(&mut self, now: Local, input: Input<'_, C>, out: &mut Outbox) {
+        match input {
+            Input::PowerOn => self.power_on(now, out),
+            Input::Deadline { timer, .. } => self.due(now, timer, out),
+            Input::Telegram(_) | Input::Sent | Input::Sample(_) | Input::Command(_) => {}
+        }
+    }
+    #[inline(never)]
+    fn sampled(&mut self, raw: u32, out: &mut Outbox) {
+        if self.slave.state() == SlaveState::DataExch {
+            self.body.latch(raw, true, out);
+        }
+    }
     fn power_on(&mut self, now: Local, out: &mut Outbox) {
         self.leds = LedLogic::default();
         self.body.reset(out);
@@ -229,7 +241,6 @@ impl<F: Function> Unit<F> {
         }
     }
     /// A deadline came due that does not in every cycle.
-    #[cold]
     fn due(&mut self, now: Local, timer: Timer, out: &mut Outbox) {
         match timer {
             Timer::Window => self.body.window_closed(now, out),
@@ -255,9 +266,18 @@ impl<F: Function> Body<F> {
     }
 
     /// The control words take effect: at T_O, or with each request while the clock is not locked.
+    #[inline]
     fn take_over(&mut self, out: &mut Outbox) {
         let causes = core::mem::take(&mut self.causes);
         self.answer = self.sensor.cycle(self.outputs.g1_stw.0, causes);
+        let Answer { preset, latched, cleared, .. } = self.answer;
+        if preset.is_some() || !latched.is_empty() || cleared.is_some() {
+            self.act_on_answer(out);
+        }
+    }
+    /// The handshake says more than the words that go to the master.
+    #[cold]
+    fn act_on_answer(&mut self, out: &mut Outbox) {
         if let Some(preset) = self.answer.preset {
             self.function.preset(preset, self.raw);
         }
@@ -462,13 +482,14 @@ impl<F: Function> Application for Body<F> {
         self.outputs = outputs.and_then(Outputs81::parse).unwrap_or_default();
         if let Some(iso) = &mut self.iso {
             iso.exchanged(out);
+            if iso.is_locked() {
+                return;
+            }
         }
-        if !self.is_locked() {
-            // A preset is about the position that this reply carries.
-            self.raw = sample;
-            self.take_over(out);
-            self.latch(sample, false, out);
-        }
+        // A preset is about the position that this reply carries.
+        self.raw = sample;
+        self.take_over(out);
+        self.latch(sample, false, out);
     }
     fn transfer(&mut self, _now: Local, outputs: Option<&[u8]>, out: &mut Outbox) {
         self.outputs = outputs.and_then(Outputs81::parse).unwrap_or_default();

@@ -22,28 +22,28 @@
 use crate::wire::control::GlobalControl;
 use crate::wire::diag::DiagStatus;
 
-/// Most octets in either direction.
-const MAX: usize = 244;
+/// Room for the octets of either direction: 244 at most, and more than any length that an octet names.
+const ROOM: usize = 256;
 
 /// Outputs and inputs between the line and the device.
 #[derive(Clone, Debug)]
-#[allow(clippy::struct_excessive_bools)] // What is asked for, what is on, what is there: all independent.
+#[allow(clippy::struct_excessive_bools)] // What is asked for and what is there: all independent.
 pub struct Image {
     /// Octets of a Data_Exchange.
     outputs: u8,
     inputs: u8,
     /// Outputs in force, zero while `valid` is false: none came yet, or they were cleared.
-    in_force: [u8; MAX],
+    in_force: [u8; ROOM],
     valid: bool,
     /// Outputs that the next Sync brings, if `waiting`.
-    next: [u8; MAX],
+    next: [u8; ROOM],
     waiting: bool,
     /// Sync_Req and Freeze_Req.
     may_sync: bool,
     may_freeze: bool,
-    sync: bool,
-    freeze: bool,
-    held: [u8; MAX],
+    /// Sync_Mode and Freeze_Mode.
+    modes: DiagStatus,
+    held: [u8; ROOM],
 }
 
 impl Image {
@@ -52,15 +52,14 @@ impl Image {
         Self {
             outputs,
             inputs,
-            in_force: [0; MAX],
+            in_force: [0; ROOM],
             valid: false,
-            next: [0; MAX],
+            next: [0; ROOM],
             waiting: false,
             may_sync: false,
             may_freeze: false,
-            sync: false,
-            freeze: false,
-            held: [0; MAX],
+            modes: DiagStatus(0),
+            held: [0; ROOM],
         }
     }
     /// Forgets everything and takes Sync and Freeze from now on, or does not (Sync_Req, Freeze_Req).
@@ -74,7 +73,7 @@ impl Image {
 
     /// Outputs in force; none before the first ones and after Clear.
     pub fn outputs(&self) -> Option<&[u8]> {
-        self.valid.then_some(self.octets())
+        self.valid.then(|| self.octets())
     }
     /// As [`outputs`](Self::outputs), zero where there are none: what RD_Outp reads.
     pub fn octets(&self) -> &[u8] {
@@ -82,26 +81,32 @@ impl Image {
     }
     /// The inputs that are held in Freeze mode.
     pub fn held(&self) -> Option<&[u8]> {
-        self.freeze.then_some(&self.held[..self.inputs.into()])
+        self.modes.freeze_mode().then(|| &self.held[..self.inputs.into()])
     }
     /// Sync_Mode and Freeze_Mode of the diagnosis.
-    pub fn modes(&self) -> DiagStatus {
-        DiagStatus::default().with(DiagStatus::SYNC_MODE, self.sync).with(DiagStatus::FREEZE_MODE, self.freeze)
+    pub const fn modes(&self) -> DiagStatus {
+        self.modes
     }
 
-    /// A Data_Exchange brought outputs.
-    ///
-    /// # Panics
-    /// If their length is another than the image's: a bug of the caller.
-    pub fn exchange(&mut self, du: &[u8]) {
-        let place = if self.sync { &mut self.next } else { &mut self.in_force };
-        place[..self.outputs.into()].copy_from_slice(du);
-        self.waiting = self.sync;
-        self.valid |= !self.sync;
+    /// A Data_Exchange brought outputs. Tells whether they have the image's length; else nothing changes.
+    pub fn exchange(&mut self, du: &[u8]) -> bool {
+        if du.len() != usize::from(self.outputs) {
+            return false;
+        }
+        let waiting = self.modes.sync_mode();
+        let place = if waiting { &mut self.next } else { &mut self.in_force };
+        match *du {
+            // Telegram 81, with which nearly all come: no call for so few octets.
+            [a, b, c, d] => place[..4].copy_from_slice(&[a, b, c, d]),
+            _ => place[..du.len()].copy_from_slice(du),
+        }
+        self.waiting = waiting;
+        self.valid |= !waiting;
+        true
     }
     /// Clear_Data or an empty Data_Exchange. Tells whether outputs were in force.
     pub fn clear(&mut self) -> bool {
-        self.in_force = [0; MAX];
+        self.in_force = [0; ROOM];
         self.waiting = false;
         core::mem::take(&mut self.valid)
     }
@@ -111,10 +116,10 @@ impl Image {
         let mut changed = false;
         if let Some(sync) = control.sync_mode().filter(|_| self.may_sync) {
             changed = self.transfer();
-            self.sync = sync;
+            self.modes = self.modes.with(DiagStatus::SYNC_MODE, sync);
         }
         if let Some(freeze) = control.freeze_mode().filter(|_| self.may_freeze) {
-            self.freeze = freeze;
+            self.modes = self.modes.with(DiagStatus::FREEZE_MODE, freeze);
             if freeze {
                 inputs(&mut self.held[..self.inputs.into()]);
             }
@@ -152,10 +157,10 @@ mod tests {
     fn image(sync: bool) -> Image {
         let mut image = Image::new(1, 1);
         image.parameterise(true, true);
-        image.exchange(&[1]);
+        assert!(image.exchange(&[1]));
         if sync {
             image.control(SYNC, |_| unreachable!());
-            image.exchange(&[2]);
+            assert!(image.exchange(&[2]));
         }
         image
     }
@@ -184,7 +189,7 @@ mod tests {
             let mut image = image(before);
             let changed = match input {
                 Exchange(octet) => {
-                    image.exchange(&[octet]);
+                    assert!(image.exchange(&[octet]));
                     false
                 }
                 Control(control) => image.control(control, |_| ()),
@@ -200,7 +205,9 @@ mod tests {
         let mut image = image(true);
         assert!(image.clear() && !image.clear(), "the second time nothing was in force");
         assert!(!image.control(SYNC, |_| ()), "nothing waits");
-        image.exchange(&[3]);
+        assert!(!image.exchange(&[]) && !image.exchange(&[3, 3]), "another length than the image's");
+        assert!(!image.control(SYNC, |_| ()), "nothing waits still");
+        assert!(image.exchange(&[3]));
         assert_eq!(image.outputs(), None);
         assert!(image.control(SYNC, |_| ()));
         assert_eq!(image.outputs(), Some(&[3][..]));

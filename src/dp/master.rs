@@ -53,11 +53,11 @@ use crate::dp::supervision::Supervision;
 use crate::dp::{GLOBAL_CONTROL, SLAVE_DIAG};
 use crate::fdl::active::{Active, Confirm, HoldToken, Request};
 use crate::fdl::params::BusParams;
-use crate::fdl::{Filter, Input, Outbox, Station, Timer};
+use crate::fdl::{Filter, Heard, Input, Outbox, Station, Timer};
 use crate::observation::{HandlerState, MasterClass, MasterMode, Observation};
 use crate::time::{Local, Span};
 use crate::wire::control::GlobalControl;
-use crate::wire::{Address, Frame, Service, Status};
+use crate::wire::{Address, Frame, Service, Status, Telegram};
 
 /// Characters of a Global_Control telegram.
 const GC_OCTETS: usize = 13;
@@ -269,13 +269,15 @@ impl<A: Application> Master<A> {
         self.active.power_on(now, out);
     }
 
+    /// Goes on after whatever is no reply to Data_Exchange.
+    #[cold]
     fn confirmed(&mut self, now: Local, confirm: Confirm<'_>, out: &mut Outbox) {
         match (self.part, confirm) {
             (_, Confirm::Nothing) => {}
             (_, Confirm::TokenHeld) => self.token_held(now, out),
             (_, Confirm::TokenGone) => self.token_gone(out),
             (Part::Exchange(slave), confirm) => {
-                self.exchange_answered(now, slave, confirm, out);
+                self.exchange_failed(now, slave, confirm, out);
                 self.exchange(now, slave + 1, out);
             }
             (Part::Startup(slave), confirm) => {
@@ -350,32 +352,53 @@ impl<A: Application> Master<A> {
         let Some(slave) = (from..self.handlers.len()).find(|&slave| self.handlers[slave].exchanges()) else {
             return self.exchange_done(out);
         };
-        if self.stops_before(slave, now, out) {
+        if self.is_free() && self.stops_before(slave, now, out) {
             return;
         }
         self.exchanged = true;
         self.part = Part::Exchange(slave);
-        let handler = &mut self.handlers[slave];
+        let (handler, app) = (&mut self.handlers[slave], &mut self.app);
         let free = self.active.free_at().max(now);
         let at = handler.earliest().map_or(free, |earliest| earliest.max(free));
         handler.asked(at);
-        let handler = &self.handlers[slave];
-        let request = handler.exchange(self.settings.dx_retries);
         if handler.diagnosis_in_place() {
-            let request = Request { service: Service::SrdHigh, saps: Some(SLAVE_DIAG), ..request };
-            return self.active.request(at, &request, 0, out, |_| ());
+            return self.diagnose_in_place(at, slave, out);
         }
-        let params = handler.params();
-        let app = &mut self.app;
-        match self.mode {
-            MasterMode::Operate => {
-                self.active.request(at, &request, params.outputs.into(), out, |du| app.outputs(slave, du));
-            }
-            _ if params.fail_safe => self.active.request(at, &request, 0, out, |_| ()),
-            _ => self.active.request(at, &request, params.outputs.into(), out, |_| ()),
+        if self.mode != MasterMode::Operate {
+            return self.exchange_in_clear(at, slave, out);
+        }
+        let (request, outputs) = (handler.exchange(self.settings.dx_retries), handler.params().outputs);
+        self.active.request(at, &request, outputs.into(), out, |du| app.outputs(slave, du));
+    }
+    /// Data_Exchange without outputs, or with zeros in their place.
+    #[cold]
+    fn exchange_in_clear(&mut self, at: Local, slave: usize, out: &mut Outbox) {
+        let handler = &self.handlers[slave];
+        let (request, params) = (handler.exchange(self.settings.dx_retries), handler.params());
+        let outputs = if params.fail_safe { 0 } else { params.outputs };
+        self.active.request(at, &request, outputs.into(), out, |_| ());
+    }
+    #[cold]
+    fn diagnose_in_place(&mut self, at: Local, slave: usize, out: &mut Outbox) {
+        let request = self.handlers[slave].exchange(self.settings.dx_retries);
+        let request = Request { service: Service::SrdHigh, saps: Some(SLAVE_DIAG), ..request };
+        self.active.request(at, &request, 0, out, |_| ());
+    }
+    #[inline]
+    fn exchange_answered(&mut self, now: Local, slave: usize, (status, du): (Status, &[u8]), out: &mut Outbox) {
+        let handler = &mut self.handlers[slave];
+        let good = matches!(status, Status::Dl | Status::Dh) && du.len() == usize::from(handler.params().inputs);
+        if good && !handler.diagnosis_in_place() {
+            self.exchange_end = now;
+            handler.exchanged(now, status == Status::Dh, out);
+            self.app.inputs(slave, Some(du), out);
+        } else {
+            self.exchange_failed(now, slave, Confirm::Reply { status, du }, out);
         }
     }
-    fn exchange_answered(&mut self, now: Local, slave: usize, confirm: Confirm<'_>, out: &mut Outbox) {
+    /// Data_Exchange, or the diagnosis in its place, was not answered with inputs.
+    #[cold]
+    fn exchange_failed(&mut self, now: Local, slave: usize, confirm: Confirm<'_>, out: &mut Outbox) {
         self.exchange_end = now;
         let handler = &mut self.handlers[slave];
         let expected = usize::from(handler.params().inputs);
@@ -383,11 +406,6 @@ impl<A: Application> Master<A> {
             Confirm::Reply { status: Status::Dl | Status::Dh, du } if handler.diagnosis_in_place() => {
                 handler.answered(Answer::Data(du), out);
                 !handler.exchanges()
-            }
-            Confirm::Reply { status: status @ (Status::Dl | Status::Dh), du } if du.len() == expected => {
-                handler.exchanged(now, status == Status::Dh, out);
-                self.app.inputs(slave, Some(du), out);
-                return;
             }
             Confirm::Acknowledged if expected == 0 => return handler.exchanged(now, false, out),
             Confirm::NoReply => handler.missed(self.settings.lost_after, out),
@@ -578,11 +596,32 @@ impl<A: Application> Master<A> {
     /// As [`Station::step`], but for orders: those are ignored here and taken by [`order`](Self::order).
     pub fn take<C: Copy>(&mut self, now: Local, input: Input<'_, C>, out: &mut Outbox) {
         match input {
-            Input::PowerOn => self.power_on(now, out),
-            Input::Telegram(heard) => {
-                let confirm = self.active.heard(now, heard, out);
-                self.confirmed(now, confirm, out);
+            Input::Telegram(heard) => self.heard(now, heard, out),
+            _ => self.take_other(now, input, out),
+        }
+    }
+    #[inline(never)]
+    fn heard(&mut self, now: Local, heard: Heard<'_>, out: &mut Outbox) {
+        let parsed = Telegram::parse(heard.octets);
+        if let Ok(telegram) = &parsed
+            && let Some((status, du)) = self.active.replied(now, telegram, out)
+        {
+            if let Part::Exchange(slave) = self.part {
+                self.exchange_answered(now, slave, (status, du), out);
+                self.exchange(now, slave + 1, out);
+            } else {
+                self.confirmed(now, Confirm::Reply { status, du }, out);
             }
+        } else {
+            let confirm = self.active.heard_other(now, parsed.as_ref().ok(), out);
+            self.confirmed(now, confirm, out);
+        }
+    }
+    /// Takes what is no telegram.
+    #[inline(never)]
+    fn take_other<C: Copy>(&mut self, now: Local, input: Input<'_, C>, out: &mut Outbox) {
+        match input {
+            Input::PowerOn => self.power_on(now, out),
             Input::Sent if self.part == Part::Clock => self.clock_sent(now, out),
             Input::Sent if self.bereft => self.cycle_begins(now, out),
             Input::Deadline { timer: Timer::Slot, busy } => {
@@ -590,7 +629,7 @@ impl<A: Application> Master<A> {
                 self.confirmed(now, confirm, out);
             }
             Input::Deadline { timer: Timer::Schedule, .. } => self.scheduled(now, out),
-            Input::Sent | Input::Deadline { .. } | Input::Sample(_) | Input::Command(_) => {}
+            Input::Telegram(_) | Input::Sent | Input::Deadline { .. } | Input::Sample(_) | Input::Command(_) => {}
         }
     }
     /// Takes an order.

@@ -41,7 +41,7 @@ use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::control::GlobalControl;
 use crate::wire::diag::{DiagBuffer, DiagStatus, Diagnosis};
 use crate::wire::prm::{PrmError, SetPrm};
-use crate::wire::{Address, FrameControl, Header, Sap, Service, Status};
+use crate::wire::{Address, FrameControl, Header, Sap, Service, Status, Telegram};
 
 /// Time from an acyclic request to its answer. Model: none of the sources has a number.
 pub const ACYCLIC_TIME: Span = Span::from_ms(2);
@@ -150,14 +150,6 @@ pub struct Identity {
     pub ms2: ms2::Settings,
 }
 
-/// A request to execute.
-struct Arrived<'a> {
-    now: Local,
-    header: Header,
-    du: &'a [u8],
-    sample: u32,
-}
-
 /// A DP slave without its device.
 #[derive(Clone, Debug)]
 pub struct Slave {
@@ -247,18 +239,20 @@ impl Slave {
 
     /// Takes a telegram whose last bit arrived at `now`.
     pub fn heard(&mut self, now: Local, heard: Heard<'_>, app: &mut impl Application, out: &mut Outbox) {
-        match self.passive.heard(now, heard, out) {
+        let parsed = Telegram::parse(heard.octets);
+        let Ok(telegram) = &parsed else { return };
+        match self.passive.heard(now, telegram, out) {
             Indication::Nothing => {}
             Indication::Request { header, du } => {
                 if self.master == Some(header.sa) {
                     self.retrigger(now, out);
                 }
-                let request = Arrived { now, header, du, sample: heard.sample };
-                self.request(&request, app, out);
+                match (header.dsap, header.ssap) {
+                    (None, None) => self.data_exchange(now, header, (du, heard.sample), app, out),
+                    _ => self.service(now, header, du, app, out),
+                }
             }
-            Indication::Broadcast { header, du } => {
-                self.broadcast(&Arrived { now, header, du, sample: heard.sample }, app, out);
-            }
+            Indication::Broadcast { header, du } => self.broadcast(now, header, (du, heard.sample), app, out),
             Indication::Published { publisher, du } => app.published(now, publisher, du, out),
         }
     }
@@ -268,49 +262,38 @@ impl Slave {
         }
     }
 
-    fn request(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
-        match (request.header.dsap, request.header.ssap) {
-            (None, None) => self.data_exchange(request, app, out),
-            _ => self.service(request, app, out),
-        }
-    }
     /// A request for a service access point.
     #[cold]
-    fn service(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
-        let &Arrived { now, header, du, .. } = request;
+    fn service(&mut self, now: Local, header: &Header, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
         match (header.dsap, header.ssap) {
-            (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, header.sa, app, out),
+            (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, header, app, out),
             (Some(Sap::GET_CFG), Some(Sap::MASTER_MS0)) => {
                 let config = &self.identity.config;
-                self.passive.reply(now, Status::Dl, config.len(), out, |du| du.copy_from_slice(config));
+                self.passive.reply(now, header, Status::Dl, config.len(), out, |du| du.copy_from_slice(config));
             }
-            (Some(Sap::SET_PRM), Some(Sap::MASTER_MS0)) => self.set_prm(now, header.sa, du, app, out),
-            (Some(Sap::CHK_CFG), Some(Sap::MASTER_MS0)) => self.chk_cfg(now, header.sa, du, app, out),
+            (Some(Sap::SET_PRM), Some(Sap::MASTER_MS0)) => self.set_prm(now, header, du, app, out),
+            (Some(Sap::CHK_CFG), Some(Sap::MASTER_MS0)) => self.chk_cfg(now, header, du, app, out),
             (Some(Sap::RD_INP), Some(Sap::MASTER_MS0)) if self.state == SlaveState::DataExch => {
-                self.reply_inputs(now, Status::Dl, app, out);
+                self.reply_held_or_fresh(now, header, Status::Dl, app, out);
             }
             (Some(Sap::RD_OUTP), Some(Sap::MASTER_MS0)) if self.state == SlaveState::DataExch => {
                 let outputs = self.image.octets();
-                self.passive.reply(now, Status::Dl, outputs.len(), out, |du| du.copy_from_slice(outputs));
+                self.passive.reply(now, header, Status::Dl, outputs.len(), out, |du| du.copy_from_slice(outputs));
             }
-            (Some(Sap::MS1), Some(Sap::MASTER_MS1)) => self.ms1(request, app, out),
+            (Some(Sap::MS1), Some(Sap::MASTER_MS1)) => self.ms1(now, header, du, app, out),
             (Some(dsap), Some(ssap)) if self.ms2.has(dsap) => {
                 let message = Message { master: header.sa, ssap, dsap, du };
-                self.ms2(now, &message, app, out);
+                answer(&mut self.passive, now, header, self.ms2.heard(now, &message, app, out), out);
+                self.supervise(out);
             }
-            _ => self.refuse(now, out),
+            _ => self.refuse(now, header, out),
         }
     }
-    fn ms1(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
-        let &Arrived { now, header, du, .. } = request;
+    fn ms1(&mut self, now: Local, header: &Header, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
         if self.state != SlaveState::DataExch || !self.dpv1 || self.is_foreign(header.sa) {
-            return self.refuse(now, out);
+            return self.refuse(now, header, out);
         }
-        answer(&mut self.passive, now, self.ms1.heard(now, du, app), out);
-    }
-    fn ms2(&mut self, now: Local, message: &Message<'_>, app: &mut impl Application, out: &mut Outbox) {
-        answer(&mut self.passive, now, self.ms2.heard(now, message, app, out), out);
-        self.supervise(out);
+        answer(&mut self.passive, now, header, self.ms1.heard(now, du, app), out);
     }
     /// [`Timer::Connection`] came due.
     pub fn connection_due(&mut self, now: Local, app: &mut impl Application, out: &mut Outbox) {
@@ -324,55 +307,69 @@ impl Slave {
         }
     }
     #[cold]
-    fn refuse(&mut self, now: Local, out: &mut Outbox) {
-        self.passive.reply(now, Status::Rs, 0, out, |_| ());
+    fn refuse(&mut self, now: Local, request: &Header, out: &mut Outbox) {
+        self.passive.reply(now, request, Status::Rs, 0, out, |_| ());
     }
     /// Whether another master than `sa` has this slave.
     fn is_foreign(&self, sa: Address) -> bool {
         self.state != SlaveState::WaitPrm && self.master.is_some_and(|master| master != sa)
     }
 
-    fn data_exchange(&mut self, request: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
-        let &Arrived { now, header, du, sample } = request;
+    fn data_exchange(
+        &mut self,
+        now: Local,
+        header: &Header,
+        (du, sample): (&[u8], u32),
+        app: &mut impl Application,
+        out: &mut Outbox,
+    ) {
         let published = matches!(header.fc, FrameControl::Request { service: Service::Msrd, .. });
         if self.state != SlaveState::DataExch || self.is_foreign(header.sa) || (published && !self.publisher) {
-            return self.refuse(now, out);
+            return self.refuse(now, header, out);
         }
-        let expected = usize::from(self.identity.outputs);
-        match du.len() {
+        if !self.image.exchange(du) {
             // A fail-safe slave takes an empty request for Clear.
-            0 if self.fail_safe && expected > 0 => {
-                self.image.clear();
-            }
-            len if len == expected => self.image.exchange(du),
-            _ => {
-                self.refuse(now, out);
+            if !du.is_empty() || !self.fail_safe {
+                self.refuse(now, header, out);
                 return self.unlock(SlaveCause::OutputLength, now, app, out);
             }
+            self.image.clear();
         }
         app.outputs(now, self.image.outputs(), sample, out);
         let status = if self.news(app) == self.known { Status::Dl } else { Status::Dh };
-        self.reply_inputs(now, status, app, out);
+        if self.image.held().is_some() {
+            return self.reply_held_or_fresh(now, header, status, app, out);
+        }
+        self.passive.reply(now, header, status, self.identity.inputs.into(), out, |du| app.inputs(du));
     }
-    fn reply_inputs(&mut self, now: Local, status: Status, app: &impl Application, out: &mut Outbox) {
+    /// Replies with the inputs that Freeze holds, or else with those of now.
+    #[cold]
+    fn reply_held_or_fresh(
+        &mut self,
+        now: Local,
+        request: &Header,
+        status: Status,
+        app: &impl Application,
+        out: &mut Outbox,
+    ) {
         let held = self.image.held();
-        self.passive.reply(now, status, self.identity.inputs.into(), out, |du| match held {
+        self.passive.reply(now, request, status, self.identity.inputs.into(), out, |du| match held {
             Some(held) => du.copy_from_slice(held),
             None => app.inputs(du),
         });
     }
 
-    fn slave_diag(&mut self, now: Local, sa: Address, app: &impl Application, out: &mut Outbox) {
+    fn slave_diag(&mut self, now: Local, request: &Header, app: &impl Application, out: &mut Outbox) {
         let mut device = DiagBuffer::new(self.identity.max_diag);
         app.diagnosis(&mut device);
         let diagnosis = self.diagnosis(&device);
         let (standard, extended) = (diagnosis.emit(), diagnosis.extended);
-        self.passive.reply(now, Status::Dl, standard.len() + extended.len(), out, |du| {
+        self.passive.reply(now, request, Status::Dl, standard.len() + extended.len(), out, |du| {
             du[..standard.len()].copy_from_slice(&standard);
             du[standard.len()..].copy_from_slice(extended);
         });
         // A repeated request gets the same octets from the memory of the data link layer.
-        if self.master == Some(sa) {
+        if self.master == Some(request.sa) {
             self.known = self.news(app);
         }
     }
@@ -388,9 +385,9 @@ impl Slave {
         Known { modes: self.image.modes(), device: app.diagnosis_revision() }
     }
 
-    fn set_prm(&mut self, now: Local, sa: Address, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
-        if self.is_foreign(sa) {
-            return self.refuse(now, out);
+    fn set_prm(&mut self, now: Local, header: &Header, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
+        if self.is_foreign(header.sa) {
+            return self.refuse(now, header, out);
         }
         self.passive.acknowledge(now, out);
         let Ok(prm) = SetPrm::parse(du) else {
@@ -401,7 +398,7 @@ impl Slave {
             (false, false) => self.passive.set_min_tsdr(Tbit(prm.min_tsdr.into())),
             (_, true) => self.unlock(SlaveCause::Unlocked, now, app, out),
             (true, false) => match self.check_prm(&prm, app) {
-                Ok(()) => self.parameterise(now, sa, &prm, app, out),
+                Ok(()) => self.parameterise(now, header.sa, &prm, app, out),
                 Err(fault) => self.fail(fault, SlaveCause::PrmFault, now, app, out),
             },
         }
@@ -442,9 +439,9 @@ impl Slave {
         app.parameterise(prm);
     }
 
-    fn chk_cfg(&mut self, now: Local, sa: Address, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
-        if self.state == SlaveState::WaitPrm || self.is_foreign(sa) {
-            return self.refuse(now, out);
+    fn chk_cfg(&mut self, now: Local, header: &Header, du: &[u8], app: &mut impl Application, out: &mut Outbox) {
+        if self.state == SlaveState::WaitPrm || self.is_foreign(header.sa) {
+            return self.refuse(now, header, out);
         }
         self.passive.acknowledge(now, out);
         if *du != *self.identity.config {
@@ -454,8 +451,14 @@ impl Slave {
         }
     }
 
-    fn broadcast(&mut self, telegram: &Arrived<'_>, app: &mut impl Application, out: &mut Outbox) {
-        let &Arrived { now, header, du, sample } = telegram;
+    fn broadcast(
+        &mut self,
+        now: Local,
+        header: &Header,
+        (du, sample): (&[u8], u32),
+        app: &mut impl Application,
+        out: &mut Outbox,
+    ) {
         let control = (header.dsap, header.ssap) == (Some(Sap::GLOBAL_CONTROL), Some(Sap::MASTER_MS0));
         if !control || self.state != SlaveState::DataExch || self.is_foreign(header.sa) {
             return;
@@ -530,10 +533,10 @@ impl Slave {
 }
 
 /// Answers a request to an acyclic service.
-fn answer(passive: &mut Passive, now: Local, answer: Answer<'_>, out: &mut Outbox) {
+fn answer(passive: &mut Passive, now: Local, request: &Header, answer: Answer<'_>, out: &mut Outbox) {
     match answer {
         Answer::Acknowledge => passive.acknowledge(now, out),
-        Answer::Data(pdu) => passive.reply(now, Status::Dl, pdu.len(), out, |du| du.copy_from_slice(pdu)),
-        Answer::Refuse(status) => passive.reply(now, status, 0, out, |_| ()),
+        Answer::Data(pdu) => passive.reply(now, request, Status::Dl, pdu.len(), out, |du| du.copy_from_slice(pdu)),
+        Answer::Refuse(status) => passive.reply(now, request, status, 0, out, |_| ()),
     }
 }

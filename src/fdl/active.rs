@@ -33,6 +33,9 @@
 //! the active station of profirust has it. Model: a station that found others by listening, or entered a ring, scans
 //! its whole GAP once, an address at every token visit, before it keeps to G.
 
+// A request and its answer come once per slave-cycle: each call would save and fetch all registers again.
+#![allow(clippy::inline_always)]
+
 mod token;
 
 use crate::fdl::params::BusParams;
@@ -132,6 +135,7 @@ pub struct Active {
     t_id1: Span,
     t_id2: Span,
     t_sl: Span,
+    t_octet: Span,
     state: State,
     ring: Ring,
     timer: RotationTimer,
@@ -164,6 +168,7 @@ impl Active {
             t_id1: bus.span(bus.t_id1()),
             t_id2: bus.span(bus.t_id2()),
             t_sl: bus.span(bus.t_sl),
+            t_octet: bus.rate.octets(1),
             bus,
             state: State::Offline,
             peers: [Peer { fcb: Fcb::First, operational: false }; 127],
@@ -313,6 +318,7 @@ impl Active {
     ///
     /// # Panics
     /// While another answer is awaited, or above 246 octets: bugs of the caller.
+    #[inline(always)]
     pub fn request(
         &mut self,
         at: Local,
@@ -336,57 +342,82 @@ impl Active {
     fn send_last(&mut self, at: Local, out: &mut Outbox) {
         let last = &self.last;
         out.send(at, |frame| frame.copy_from(last));
-        self.asked_until = at + self.bus.rate.octets(last.len());
+        self.asked_until = at + self.t_octet * last.len() as i64;
         out.arm(Timer::Slot, self.asked_until + self.t_sl);
     }
 
     /// Takes a telegram whose last bit arrived at `now`.
     pub fn heard<'a>(&mut self, now: Local, heard: Heard<'a>, out: &mut Outbox) -> Confirm<'a> {
         let telegram = Telegram::parse(heard.octets).ok();
+        match telegram.and_then(|telegram| self.replied(now, &telegram, out)) {
+            Some((status, du)) => Confirm::Reply { status, du },
+            None => self.heard_other(now, telegram.as_ref(), out),
+        }
+    }
+    /// The first half of [`heard`](Self::heard): a reply to the request, which is nearly all that is heard.
+    #[inline(always)]
+    pub fn replied<'a>(&mut self, now: Local, telegram: &Telegram<'a>, out: &mut Outbox) -> Option<(Status, &'a [u8])> {
+        if let State::AwaitDataResponse(awaited) = self.state
+            && let Telegram::Data { header, du } = telegram
+            && let Some(status) = self.answer(now, awaited, header)
+        {
+            self.operational(now, awaited.from, out);
+            return Some((status, du));
+        }
+        None
+    }
+    /// What a telegram with data means for the request, where it answers that: not before the request has left, and not
+    /// as if it came from this very station.
+    fn answer(&self, now: Local, awaited: Awaited, header: &Header) -> Option<Status> {
+        let from = header.sa == awaited.from && header.sa != self.address;
+        match header.fc {
+            FrameControl::Response { status, .. } if from && self.is_for_me(header.da) && self.has_asked(now) => {
+                Some(status)
+            }
+            _ => None,
+        }
+    }
+    /// The asked station has answered.
+    fn operational(&mut self, now: Local, from: Address, out: &mut Outbox) {
+        self.goes_on(now, out);
+        let peer = &mut self.peers[usize::from(from.get())];
+        let counted = matches!(peer.fcb, Fcb::Alternate(_));
+        let fcb = if counted { peer.fcb.next() } else { next_of_first(peer.fcb) };
+        *peer = Peer { fcb, operational: true };
+    }
+    /// The second half of [`heard`](Self::heard): anything else that was heard, nothing for a broken telegram.
+    #[cold]
+    pub fn heard_other(&mut self, now: Local, telegram: Option<&Telegram<'_>>, out: &mut Outbox) -> Confirm<'static> {
         match self.state {
-            State::ListenToken { conflicts } => self.listens(now, conflicts, telegram, out),
-            State::ActiveIdle { skipped } => self.idles(now, skipped, telegram, out),
-            State::CheckTokenPass(_) => self.idles(now, 0, telegram, out),
+            State::ListenToken { conflicts } => self.listens(now, conflicts, telegram.copied(), out),
+            State::ActiveIdle { skipped } => self.idles(now, skipped, telegram.copied(), out),
+            State::CheckTokenPass(_) => self.idles(now, 0, telegram.copied(), out),
             State::ClaimToken { .. } if telegram.is_some() => self.listens_again(now, out),
             State::Offline | State::ClaimToken { .. } => Confirm::Nothing,
-            State::UseToken | State::PassToken(_) => {
-                self.disputed(now, telegram.as_ref(), out).unwrap_or(Confirm::Nothing)
-            }
+            State::UseToken | State::PassToken(_) => self.disputed(now, telegram, out).unwrap_or(Confirm::Nothing),
             State::AwaitDataResponse(awaited) => {
-                let disputed = self.disputed(now, telegram.as_ref(), out).or(self.is_early(now));
-                disputed.unwrap_or_else(|| self.answered(now, awaited, telegram, out))
+                let disputed = self.disputed(now, telegram, out).or(self.is_early(now));
+                disputed.unwrap_or_else(|| match telegram {
+                    Some(Telegram::ShortAck) => {
+                        self.operational(now, awaited.from, out);
+                        Confirm::Acknowledged
+                    }
+                    _ => self.unanswered(now, awaited, out),
+                })
             }
             State::AwaitStatusResponse(Awaited { from, .. }) => {
-                let disputed = self.disputed(now, telegram.as_ref(), out).or(self.is_early(now));
-                disputed.unwrap_or_else(|| self.status(now, from, telegram.as_ref(), out))
+                let disputed = self.disputed(now, telegram, out).or(self.is_early(now));
+                disputed.unwrap_or_else(|| self.status(now, from, telegram, out))
             }
         }
     }
     /// What is on the line before the request has left answers nothing.
     fn is_early(&self, now: Local) -> Option<Confirm<'static>> {
-        (now < self.asked_until).then_some(Confirm::Nothing)
+        (!self.has_asked(now)).then_some(Confirm::Nothing)
     }
-    fn answered<'a>(
-        &mut self,
-        now: Local,
-        awaited: Awaited,
-        telegram: Option<Telegram<'a>>,
-        out: &mut Outbox,
-    ) -> Confirm<'a> {
-        let confirm = match telegram {
-            Some(Telegram::ShortAck) => Confirm::Acknowledged,
-            Some(Telegram::Data { header, du }) if header.sa == awaited.from && self.is_for_me(header.da) => {
-                match header.fc {
-                    FrameControl::Response { status, .. } => Confirm::Reply { status, du },
-                    FrameControl::Request { .. } => return self.unanswered(now, awaited, out),
-                }
-            }
-            _ => return self.unanswered(now, awaited, out),
-        };
-        self.goes_on(now, out);
-        let peer = &mut self.peers[usize::from(awaited.from.get())];
-        *peer = Peer { fcb: peer.fcb.next(), operational: true };
-        confirm
+    /// Whether the request has left at `now`.
+    fn has_asked(&self, now: Local) -> bool {
+        now >= self.asked_until
     }
     /// The wait is over; the next telegram begins T_ID1 later.
     fn goes_on(&mut self, now: Local, out: &mut Outbox) {
@@ -458,6 +489,12 @@ impl Active {
         self.reset_peer(awaited.from);
         Confirm::NoReply
     }
+}
+
+/// The count after a request with FCV = 0.
+#[cold]
+const fn next_of_first(fcb: Fcb) -> Fcb {
+    fcb.next()
 }
 
 const fn gap_answer(station: StationType) -> GapAnswer {

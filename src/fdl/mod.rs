@@ -30,8 +30,10 @@ pub trait Station {
     fn step(&mut self, now: Local, input: Input<'_, Self::Command>, out: &mut Outbox);
 }
 
-/// What can happen to a station.
+/// What can happen to a station. Its kind is an octet of its own and not one left over in `C`, so that a step sees at one
+/// glance what came.
 #[derive(Clone, Copy, Debug)]
+#[repr(u8)]
 pub enum Input<'a, C> {
     /// The supply came on. The first input of every station.
     PowerOn,
@@ -191,8 +193,8 @@ impl Timer {
 pub struct Outbox {
     frame: Frame,
     send: Option<Send>,
-    /// What becomes of the deadlines; an entry counts if its bit in `ordered` is set.
-    orders: [Order; Self::DEADLINES],
+    /// When the deadlines come, never at all with [`OFF`](Self::OFF); an entry counts if its bit in `ordered` is set.
+    orders: [Local; Self::PLACES],
     ordered: u32,
     cycle_at: Option<Local>,
     sample_with_telegrams: Option<bool>,
@@ -201,7 +203,7 @@ pub struct Outbox {
     unusual: bool,
     /// Those behind the first `observed` are of earlier steps.
     observations: [Observation; Self::MAX_OBSERVATIONS],
-    observed: usize,
+    observed: u32,
 }
 
 /// When a telegram is to be sent.
@@ -236,13 +238,17 @@ impl Outbox {
     pub const DEADLINES: usize = Self::SAMPLE + 1;
     /// Number of the asked sample among the deadlines.
     pub const SAMPLE: usize = Timer::ALL.len();
+    /// Places for orders: a power of two, so that every number taken modulo it has one.
+    const PLACES: usize = Self::DEADLINES.next_power_of_two();
+    /// An instant that no clock reaches: the order to disarm.
+    const OFF: Local = Local::MAX;
 
     /// An empty outbox.
     pub const fn new() -> Self {
         Self {
             frame: Frame::new(),
             send: None,
-            orders: [Order::Off; Self::DEADLINES],
+            orders: [Self::OFF; Self::PLACES],
             ordered: 0,
             cycle_at: None,
             sample_with_telegrams: None,
@@ -287,23 +293,23 @@ impl Outbox {
 
     /// Arms `timer`; an earlier arming is forgotten.
     pub fn arm(&mut self, timer: Timer, at: Local) {
-        self.order(timer as usize, Order::At(at));
+        self.order(timer as usize, at);
     }
     /// Disarms `timer`.
     pub fn disarm(&mut self, timer: Timer) {
-        self.order(timer as usize, Order::Off);
+        self.order(timer as usize, Self::OFF);
     }
-    fn order(&mut self, which: usize, order: Order) {
-        self.orders[which] = order;
+    fn order(&mut self, which: usize, at: Local) {
+        self.orders[which] = at;
         self.ordered |= 1 << which;
     }
     /// Asks for the raw position of the shaft at `at`; [`Input::Sample`] brings it. One at a time.
     pub fn sample_at(&mut self, at: Local) {
-        self.order(Self::SAMPLE, Order::At(at));
+        self.order(Self::SAMPLE, at);
     }
     /// Forgets an asked sample.
     pub fn cancel_sample(&mut self) {
-        self.order(Self::SAMPLE, Order::Off);
+        self.order(Self::SAMPLE, Self::OFF);
     }
     /// From now on every telegram brings the shaft's raw position along, or no more (Model: D8).
     pub fn sample_with_telegrams(&mut self, on: bool) {
@@ -315,7 +321,7 @@ impl Outbox {
     }
     /// Tells what was seen or done.
     pub fn observe(&mut self, observation: Observation) {
-        self.observations[self.observed] = observation;
+        self.observations[self.observed as usize] = observation;
         self.observed += 1;
     }
 
@@ -340,7 +346,8 @@ impl Outbox {
             }
             let which = left.trailing_zeros() as usize;
             left &= left - 1;
-            Some((which, self.orders[which]))
+            let at = self.orders[which % Self::PLACES];
+            Some((which, if at == Self::OFF { Order::Off } else { Order::At(at) }))
         })
     }
     /// Whether a cycle begins, or the shaft's position or other telegrams are wanted than before: what steps seldom say.
@@ -358,7 +365,7 @@ impl Outbox {
     }
     /// What was observed, in order.
     pub fn observations(&self) -> impl Iterator<Item = &Observation> {
-        self.observations[..self.observed].iter()
+        self.observations[..self.observed as usize].iter()
     }
 }
 

@@ -11,8 +11,8 @@
 //!
 //! Source: EN 50170-2, FCB and FCV rules.
 
-use crate::fdl::{Heard, Outbox};
-use crate::time::{BitRate, Local, Tbit};
+use crate::fdl::Outbox;
+use crate::time::{BitRate, Local, Span, Tbit};
 use crate::wire::{Address, Fcb, Frame, FrameControl, Header, Service, StationType, Status, Telegram};
 
 /// What a heard telegram means for the layer above.
@@ -20,17 +20,17 @@ use crate::wire::{Address, Fcb, Frame, FrameControl, Header, Service, StationTyp
 pub enum Indication<'a> {
     /// Nothing: not for this station, broken, or dealt with here.
     Nothing,
-    /// A request to execute once; [`Passive::reply`] or [`Passive::acknowledge`] must answer in the same step.
+    /// A request to execute once; [`Passive::reply`] or [`Passive::acknowledge`] must answer it in the same step.
     Request {
         /// Addresses, SAPs and service.
-        header: Header,
+        header: &'a Header,
         /// Data unit.
         du: &'a [u8],
     },
     /// A telegram for several stations that nobody answers.
     Broadcast {
         /// Addresses, SAPs and service.
-        header: Header,
+        header: &'a Header,
         /// Data unit.
         du: &'a [u8],
     },
@@ -52,9 +52,9 @@ pub struct Passive {
     own_tsdr: Tbit,
     /// min T_SDR in force, set by the master (Set_Prm octet 4).
     min_tsdr: Tbit,
+    /// T_SDR of the next answer as a span.
+    answers_after: Span,
     memory: Memory,
-    /// The request to answer in this step.
-    pending: Option<Header>,
 }
 
 /// What is kept to recognise a repeated request.
@@ -66,11 +66,21 @@ struct Memory {
     reply: Frame,
 }
 
+impl Memory {
+    /// Whether the request that is kept is this master's and was answered.
+    #[cold]
+    fn has_replied_to(&self, master: Address) -> bool {
+        self.request.is_some_and(|(of, _)| of == master) && !self.reply.is_empty()
+    }
+}
+
 impl Passive {
     /// A station at `address` that needs `own_tsdr` to answer.
     pub fn new(address: Address, rate: BitRate, own_tsdr: Tbit) -> Self {
         let memory = Memory { request: None, reply: Frame::new() };
-        Self { address, rate, own_tsdr, min_tsdr: Tbit(11), memory, pending: None }
+        let mut passive = Self { address, rate, own_tsdr, min_tsdr: Tbit(0), answers_after: Span::ZERO, memory };
+        passive.set_min_tsdr(Tbit(11));
+        passive
     }
     /// The station's address.
     pub const fn address(&self) -> Address {
@@ -84,14 +94,14 @@ impl Passive {
     pub fn set_min_tsdr(&mut self, min_tsdr: Tbit) {
         if min_tsdr.0 > 0 {
             self.min_tsdr = min_tsdr;
+            self.answers_after = self.rate.span(self.t_sdr());
         }
     }
 
-    /// Takes a telegram whose last bit arrived at `now`.
+    /// Takes a telegram whose last bit arrived at `now`. A broken one is dropped before, without a word (EN 50170-2).
     #[inline]
-    pub fn heard<'a>(&mut self, now: Local, heard: Heard<'a>, out: &mut Outbox) -> Indication<'a> {
-        // A broken telegram is dropped without a word (EN 50170-2).
-        let Ok(Telegram::Data { header, du }) = Telegram::parse(heard.octets) else { return Indication::Nothing };
+    pub fn heard<'a>(&mut self, now: Local, telegram: &'a Telegram<'a>, out: &mut Outbox) -> Indication<'a> {
+        let Telegram::Data { header, du } = telegram else { return Indication::Nothing };
         match header.fc {
             // A publisher that refuses has published nothing.
             FrameControl::Response { status: Status::Dl | Status::Dh, .. } if header.da == Address::BROADCAST => {
@@ -101,7 +111,7 @@ impl Passive {
             FrameControl::Request { .. } if header.da == Address::BROADCAST => Indication::Broadcast { header, du },
             FrameControl::Request { .. } if header.da != self.address => Indication::Nothing,
             FrameControl::Request { service: Service::FdlStatus, .. } => {
-                self.answer_status(now, &header, out);
+                self.answer_status(now, header, out);
                 Indication::Nothing
             }
             FrameControl::Request { service, fcb } if service.expects_reply() => {
@@ -109,51 +119,58 @@ impl Passive {
                     self.reply_again(now, out);
                     return Indication::Nothing;
                 }
-                self.pending = Some(header);
                 Indication::Request { header, du }
             }
             FrameControl::Request { .. } => Indication::Broadcast { header, du },
         }
     }
 
+    #[inline]
     fn is_repeated(&mut self, master: Address, fcb: Fcb) -> bool {
-        let request = match fcb {
-            Fcb::Unused => None,
-            Fcb::First => Some((master, true)),
-            Fcb::Alternate(bit) if self.memory.request == Some((master, bit)) && !self.memory.reply.is_empty() => {
-                return true;
+        self.memory.request = match fcb {
+            Fcb::Alternate(bit) => {
+                if self.memory.request.is_some_and(|(_, last)| last == bit) && self.memory.has_replied_to(master) {
+                    return true;
+                }
+                Some((master, bit))
             }
-            Fcb::Alternate(bit) => Some((master, bit)),
+            fcb => uncounted(master, fcb),
         };
-        self.memory.request = request;
         self.memory.reply.clear();
         false
     }
 
     #[cold]
     fn reply_again(&self, now: Local, out: &mut Outbox) {
-        out.send(now + self.rate.span(self.t_sdr()), |frame| frame.copy_from(&self.memory.reply));
+        out.send(now + self.answers_after, |frame| frame.copy_from(&self.memory.reply));
     }
     #[cold]
     fn answer_status(&self, now: Local, request: &Header, out: &mut Outbox) {
         let fc = FrameControl::Response { station: StationType::Slave, status: Status::Ok };
         let header = Header { da: request.sa, sa: self.address, dsap: None, ssap: None, fc };
-        out.send(now + self.rate.span(self.t_sdr()), |frame| {
+        out.send(now + self.answers_after, |frame| {
             frame.set_data(&header, &[]).expect("an empty reply fits");
         });
     }
 
-    /// Answers the request of this step with `len` octets of data that `write` fills in, as a publisher to 127.
+    /// Answers `request`, which came in this step, with `len` octets of data that `write` fills in, as a publisher to 127.
     ///
     /// # Panics
-    /// Without a request in this step, and above 244 octets: both are bugs of the caller.
-    pub fn reply(&mut self, now: Local, status: Status, len: usize, out: &mut Outbox, write: impl FnOnce(&mut [u8])) {
-        let request = self.pending.take().expect("a reply needs a request");
+    /// Above 244 octets: a bug of the caller.
+    pub fn reply(
+        &mut self,
+        now: Local,
+        request: &Header,
+        status: Status,
+        len: usize,
+        out: &mut Outbox,
+        write: impl FnOnce(&mut [u8]),
+    ) {
         let mut header = request.slave_reply(status);
         if matches!(request.fc, FrameControl::Request { service: Service::Msrd, .. }) {
             header.da = Address::BROADCAST;
         }
-        let at = now + self.rate.span(self.t_sdr());
+        let at = now + self.answers_after;
         let memory = &mut self.memory.reply;
         out.send(at, |frame| {
             frame.set_data_with(&header, len, write).expect("a reply fits");
@@ -163,14 +180,19 @@ impl Passive {
 
     /// Answers the request of this step with the short acknowledgement SC.
     pub fn acknowledge(&mut self, now: Local, out: &mut Outbox) {
-        self.pending = None;
-        let at = now + self.rate.span(self.t_sdr());
+        let at = now + self.answers_after;
         let memory = &mut self.memory.reply;
         out.send(at, |frame| {
             frame.set_short_ack();
             memory.copy_from(frame);
         });
     }
+}
+
+/// What is kept of a request with FCV = 0.
+#[cold]
+fn uncounted(master: Address, fcb: Fcb) -> Option<(Address, bool)> {
+    (fcb == Fcb::First).then_some((master, true))
 }
 
 #[cfg(test)]
@@ -190,9 +212,8 @@ mod tests {
     fn ask(station: &mut Passive, frame: &Frame, value: u8) -> Option<u8> {
         let mut out = Outbox::new();
         let now = Local::from_ticks(1_000);
-        let heard = Heard { octets: frame.octets(), sample: 0 };
-        if let Indication::Request { .. } = station.heard(now, heard, &mut out) {
-            station.reply(now, Status::Dl, 1, &mut out, |du| du[0] = value);
+        if let Indication::Request { header, .. } = station.heard(now, &frame.telegram().unwrap(), &mut out) {
+            station.reply(now, header, Status::Dl, 1, &mut out, |du| du[0] = value);
         }
         let (send, frame) = out.sending()?;
         assert_eq!(send.at - now, BitRate::M12.span(Tbit(30)), "T_SDR");
@@ -228,8 +249,10 @@ mod tests {
         let mut station = Passive::new(SLAVE, BitRate::M12, Tbit(30));
         let mut out = Outbox::new();
         let frame = request(MASTER, Service::Msrd, Fcb::First);
-        station.heard(Local::ZERO, Heard { octets: frame.octets(), sample: 0 }, &mut out);
-        station.reply(Local::ZERO, Status::Dl, 1, &mut out, |_| ());
+        let telegram = frame.telegram().unwrap();
+        let indication = station.heard(Local::ZERO, &telegram, &mut out);
+        let Indication::Request { header, .. } = indication else { panic!("{indication:?}") };
+        station.reply(Local::ZERO, header, Status::Dl, 1, &mut out, |_| ());
         assert_eq!(out.sending().unwrap().1.octets()[4], 127);
     }
 
@@ -241,8 +264,8 @@ mod tests {
             let header = Header { da: Address::BROADCAST, sa: OTHER, dsap: None, ssap: None, fc };
             let mut frame = Frame::new();
             frame.set_data(&header, &[]).unwrap();
-            let heard = Heard { octets: frame.octets(), sample: 0 };
-            let indication = station.heard(Local::ZERO, heard, &mut Outbox::new());
+            let telegram = frame.telegram().unwrap();
+            let indication = station.heard(Local::ZERO, &telegram, &mut Outbox::new());
             assert_eq!(matches!(indication, Indication::Published { .. }), published, "{status}");
         }
     }
@@ -260,7 +283,7 @@ mod tests {
         let mut station = Passive::new(SLAVE, BitRate::M12, Tbit(30));
         let mut out = Outbox::new();
         let status = [0x10, 0x06, 0x02, 0x49, 0x51, 0x16];
-        station.heard(Local::ZERO, Heard { octets: &status, sample: 0 }, &mut out);
+        station.heard(Local::ZERO, &Telegram::parse(&status).unwrap(), &mut out);
         assert_eq!(out.sending().unwrap().1.octets(), [0x10, 0x02, 0x06, 0x00, 0x08, 0x16]);
     }
 }

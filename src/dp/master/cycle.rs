@@ -76,7 +76,7 @@ impl Polling {
 }
 
 impl<A: Application> Master<A> {
-    fn is_free(&self) -> bool {
+    pub(super) fn is_free(&self) -> bool {
         self.settings.pace != Pace::Synch
     }
     fn is_alone(&self) -> bool {
@@ -242,10 +242,11 @@ impl<A: Application> Master<A> {
         let longest = exchanging.map(|handler| handler.params().min_interval).max();
         self.polling.next.max(self.polling.began + longest.unwrap_or(Span::ZERO))
     }
-    /// Whether T_TH is over before Data_Exchange with `slave`, or the slave may not be asked again for longer than T_SL,
+    /// Of a free-running master: whether T_TH is over before Data_Exchange with `slave`, or the slave may not be asked again for longer than T_SL,
     /// because the token was away between it and those before it: then the token goes on, and later so does the cycle.
+    #[cold]
     pub(super) fn stops_before(&mut self, slave: usize, now: Local, out: &mut Outbox) -> bool {
-        if !self.is_free() || self.is_alone() {
+        if self.is_alone() {
             return false;
         }
         let at = self.active.free_at().max(now);

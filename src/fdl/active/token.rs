@@ -230,7 +230,6 @@ impl Active {
 
     /// What was heard while this station has the token: none if nothing speaks against that. PS repeats the token
     /// when it has not heard this station yet.
-    #[inline]
     pub(super) fn disputed(
         &mut self,
         now: Local,
