@@ -355,6 +355,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.look_at_alarms(end);
         self.alarms.next() <= end
     }
+    #[inline(always)]
     fn look_at_alarms(&mut self, limit: Time) {
         let Self { alarms, slots, now, .. } = self;
         alarms.look(limit, *now, |slot| &slots[slot].site.crystal);
@@ -408,17 +409,19 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// The next event if it is an alarm. A station's other deadlines of the instant come before its alarms.
-    #[inline(never)]
+    #[inline(always)]
     fn alarm<R: Recorder>(&mut self, recorder: &mut R) -> bool {
-        let head = self.queue.peek();
-        self.look_at_alarms(head.map_or(Time::MAX, Key::time));
+        let limit = self.queue.peek().map_or(Time::MAX, Key::time);
+        self.look_at_alarms(limit);
+        self.alarms.next() <= limit && self.ring(recorder)
+    }
+    /// The alarm that comes first, unless another event comes before it.
+    #[inline(never)]
+    fn ring<R: Recorder>(&mut self, recorder: &mut R) -> bool {
         let at = self.alarms.next();
-        if head.is_some_and(|key| key.time() < at) {
-            return false;
-        }
         let Some((slot, which, local)) = self.alarms.first(|slot| self.slots[slot].address) else { return false };
         let key = Key::new(at, Phase::Deadline, self.slots[slot].address.get(), Key::MAX_NUMBER);
-        if head.is_some_and(|head| head < key) {
+        if self.queue.peek().is_some_and(|head| head < key) {
             return false;
         }
         self.now = at;

@@ -17,7 +17,8 @@ const KINDS: usize = Timer::ALL.len();
 struct Alarm {
     /// Armed for this reading of the station's crystal; for the end of all readings where it is not armed.
     due: Local,
-    /// A reading and the true time of it: armed for this reading or a later one, it does not come before.
+    /// A reading and its true time, or an instant before that: armed for this reading or a later one, it does not come
+    /// before.
     seen: (Local, Time),
 }
 
@@ -27,26 +28,41 @@ impl Alarm {
 
     /// Finds out when it comes, not before `now`.
     fn look(&mut self, crystal: &Crystal, now: Time) -> Time {
-        if self.due == Local::MAX {
-            self.seen = Self::UNSEEN;
-        } else if self.due != self.seen.0 {
-            self.seen = (self.due, crystal.to_true(self.due).max(now));
-        }
+        self.seen = if self.due == Local::MAX { Self::UNSEEN } else { (self.due, crystal.to_true(self.due).max(now)) };
         self.seen.1
+    }
+    /// The same if that is by `limit`; otherwise an instant before which it does not come is enough.
+    #[inline]
+    fn look_until(&mut self, limit: Time, crystal: &Crystal, now: Time) -> Time {
+        if self.due != Local::MAX {
+            let earliest = crystal.not_before(self.due);
+            if earliest > limit {
+                self.seen = (self.due, earliest);
+                return earliest;
+            }
+        }
+        self.look(crystal, now)
     }
 }
 
 /// The alarms of all stations.
 #[derive(Clone, Debug)]
 pub(super) struct Alarms {
-    /// By the station's slot, then by number.
-    all: Vec<[Alarm; KINDS]>,
+    /// By the station's slot, then by number; what is no timer is never armed.
+    all: Vec<[Alarm; Outbox::DEADLINES]>,
     /// For each number the slots that have ever armed theirs.
     users: [Vec<u8>; KINDS],
-    /// For each number an instant before which none of it comes, and the earliest of these.
+    /// For each number an instant before which none of it comes.
     nexts: [Time; KINDS],
+    /// The earliest of these, without the slot time's: that is looked at with every other request, the others seldom.
+    others: Time,
+    /// The earliest of all.
     next: Time,
 }
+
+/// The number of the slot time, and those of all others.
+const SLOT_TIME: usize = Timer::Slot as usize;
+const OTHERS: core::ops::Range<usize> = SLOT_TIME + 1..KINDS;
 
 impl Alarms {
     /// Whether the deadline of this number is an alarm: every timer but those that are there to come.
@@ -59,9 +75,10 @@ impl Alarms {
     /// The alarms of so many stations, none of them armed.
     pub(super) fn new(stations: usize) -> Self {
         Self {
-            all: vec![[Alarm::OFF; KINDS]; stations],
+            all: vec![[Alarm::OFF; Outbox::DEADLINES]; stations],
             users: core::array::from_fn(|_| Vec::with_capacity(stations)),
             nexts: [Time::MAX; KINDS],
+            others: Time::MAX,
             next: Time::MAX,
         }
     }
@@ -79,14 +96,22 @@ impl Alarms {
         }
     }
     /// It is armed for an earlier reading than it was looked at for.
+    #[inline(never)]
     fn bring_forward(&mut self, (slot, which): (usize, usize), crystal: &Crystal, now: Time) {
         let alarm = &mut self.all[slot][which];
         if alarm.seen == Alarm::UNSEEN && !self.users[which].contains(&(slot as u8)) {
             self.users[which].push(slot as u8);
         }
         let comes = alarm.look(crystal, now);
-        self.nexts[which] = self.nexts[which].min(comes);
-        self.next = self.next.min(comes);
+        self.comes(which, comes);
+    }
+    /// One of this number comes at this instant, or none of it before.
+    fn comes(&mut self, which: usize, at: Time) {
+        self.nexts[which] = self.nexts[which].min(at);
+        if which != SLOT_TIME {
+            self.others = self.others.min(at);
+        }
+        self.next = self.next.min(at);
     }
     /// Disarms the one of this number.
     #[inline]
@@ -99,49 +124,66 @@ impl Alarms {
     }
     /// The station's `crystal` has another rate from `now` on.
     pub(super) fn retune(&mut self, slot: usize, crystal: &Crystal, now: Time) {
-        for (alarm, next) in self.all[slot].iter_mut().zip(&mut self.nexts) {
-            alarm.seen = Alarm::UNSEEN;
-            *next = alarm.look(crystal, now).min(*next);
-            self.next = self.next.min(*next);
+        for which in 0..KINDS {
+            let comes = self.all[slot][which].look(crystal, now);
+            self.comes(which, comes);
         }
     }
 
     /// Looks at all that may come by `limit`. If [`next`](Self::next) is not later than that now, one comes then.
-    pub(super) fn look<'a>(&mut self, limit: Time, now: Time, crystal: impl Fn(usize) -> &'a Crystal) {
-        let Self { all, users, nexts, .. } = self;
-        let mut first = Time::MAX;
-        for (which, (next, users)) in nexts.iter_mut().zip(users).enumerate() {
-            if *next <= limit {
-                *next = users.iter().fold(Time::MAX, |next, &slot| {
-                    let slot = usize::from(slot);
-                    all[slot][which].look(crystal(slot), now).min(next)
-                });
-            }
-            first = first.min(*next);
+    #[inline]
+    pub(super) fn look<'a>(&mut self, limit: Time, now: Time, crystal: impl Fn(usize) -> &'a Crystal + Copy) {
+        if self.nexts[SLOT_TIME] <= limit {
+            self.look_at(SLOT_TIME, (limit, now), crystal);
         }
-        self.next = first;
+        if self.others <= limit {
+            self.look_at_others((limit, now), crystal);
+        }
+        self.next = self.nexts[SLOT_TIME].min(self.others);
+    }
+    #[inline(never)]
+    fn look_at_others<'a>(&mut self, (limit, now): (Time, Time), crystal: impl Fn(usize) -> &'a Crystal + Copy) {
+        for which in OTHERS {
+            if self.nexts[which] <= limit {
+                self.look_at(which, (limit, now), crystal);
+            }
+        }
+        self.others = self.nexts[OTHERS].iter().fold(Time::MAX, |first, &next| first.min(next));
+    }
+    /// Looks at all of one number.
+    #[inline(never)]
+    fn look_at<'a>(&mut self, which: usize, (limit, now): (Time, Time), crystal: impl Fn(usize) -> &'a Crystal + Copy) {
+        let all = &mut self.all;
+        self.nexts[which] = self.users[which].iter().fold(Time::MAX, |next, &slot| {
+            let slot = usize::from(slot);
+            all[slot][which].look_until(limit, crystal(slot), now).min(next)
+        });
     }
     /// Which one comes first: slot, number and reading. Of several at one instant the one with the least `rank`, then the
     /// one with the least number.
     pub(super) fn first<K: Ord>(&self, rank: impl Fn(usize) -> K) -> Option<(usize, usize, Local)> {
-        let coming = (0..KINDS).filter(|&which| self.nexts[which] == self.next);
-        let armed = coming.flat_map(|which| self.users[which].iter().map(move |&slot| (usize::from(slot), which)));
-        let armed = armed.filter_map(|(slot, which)| {
-            let Alarm { due, seen } = self.all[slot][which];
-            (due != Local::MAX && seen.1 == self.next).then_some((slot, which, due))
-        });
-        armed.min_by_key(|&(slot, which, _)| (rank(slot), which))
+        let mut first = None;
+        for which in (0..KINDS).filter(|&which| self.nexts[which] == self.next) {
+            for slot in self.users[which].iter().map(|&slot| usize::from(slot)) {
+                let Alarm { due, seen } = self.all[slot][which];
+                let key = (rank(slot), which);
+                if due != Local::MAX && seen.1 == self.next && first.as_ref().is_none_or(|(least, _)| key < *least) {
+                    first = Some((key, (slot, which, due)));
+                }
+            }
+        }
+        first.map(|(_, alarm)| alarm)
     }
 }
 
 const _: () = assert!(Outbox::DEADLINES == KINDS + 1, "the asked sample is no timer");
+const _: () = assert!(SLOT_TIME == 0, "the others come after it");
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::time::Span;
 
-    const SLOT_TIME: usize = Timer::Slot as usize;
     const WINDOW: usize = Timer::Window as usize;
 
     fn reading(us: i64) -> Local {
