@@ -270,7 +270,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let turning = faults.take_turning();
         let mut network = Self {
             rate,
-            alarms: Alarms::new(slots.len()),
+            alarms: Alarms::new(slots.iter().map(|slot| slot.site.crystal.clone())),
             slots,
             by_address,
             attentive: Vec::new(),
@@ -357,8 +357,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     #[inline(always)]
     fn look_at_alarms(&mut self, limit: Time) {
-        let Self { alarms, slots, now, .. } = self;
-        alarms.look(limit, *now, |slot| &slots[slot].site.crystal);
+        self.alarms.look(limit, self.now);
     }
 
     /// The next event. False when nothing will ever happen again.
@@ -573,7 +572,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         for (which, order) in out.orders() {
             match (Alarms::has(which), order) {
-                (true, Order::At(at)) => alarms.arm((index, which), at.max(now), &slot.site.crystal, *instant),
+                (true, Order::At(at)) => alarms.arm((index, which), at.max(now), *instant),
                 (true, Order::Off) => alarms.disarm((index, which)),
                 (false, Order::At(at)) => Self::arm(queue, (index, slot), which, at.max(now), *instant),
                 (false, Order::Off) => slot.deadlines[which].disarm(),

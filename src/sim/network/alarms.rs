@@ -27,6 +27,7 @@ impl Alarm {
     const UNSEEN: (Local, Time) = (Local::MAX, Time::MAX);
 
     /// Finds out when it comes, not before `now`.
+    #[inline(never)]
     fn look(&mut self, crystal: &Crystal, now: Time) -> Time {
         self.seen = if self.due == Local::MAX { Self::UNSEEN } else { (self.due, crystal.to_true(self.due).max(now)) };
         self.seen.1
@@ -34,22 +35,33 @@ impl Alarm {
     /// The same if that is by `limit`; otherwise an instant before which it does not come is enough.
     #[inline]
     fn look_until(&mut self, limit: Time, crystal: &Crystal, now: Time) -> Time {
-        if self.due != Local::MAX {
-            let earliest = crystal.not_before(self.due);
-            if earliest > limit {
-                self.seen = (self.due, earliest);
-                return earliest;
-            }
+        if self.due == Local::MAX {
+            self.seen = Self::UNSEEN;
+            return Time::MAX;
         }
-        self.look(crystal, now)
+        match crystal.not_before(self.due) {
+            Some(earliest) if earliest > limit => {
+                self.seen = (self.due, earliest);
+                earliest
+            }
+            _ => self.look(crystal, now),
+        }
     }
+}
+
+/// What one station waits for, and the crystal that it waits by.
+#[derive(Clone, Debug)]
+struct Waiting {
+    crystal: Crystal,
+    /// By number; what is no timer is never armed.
+    alarms: [Alarm; Outbox::DEADLINES],
 }
 
 /// The alarms of all stations.
 #[derive(Clone, Debug)]
 pub(super) struct Alarms {
-    /// By the station's slot, then by number; what is no timer is never armed.
-    all: Vec<[Alarm; Outbox::DEADLINES]>,
+    /// By the station's slot.
+    all: Vec<Waiting>,
     /// For each number the slots that have ever armed theirs.
     users: [Vec<u8>; KINDS],
     /// For each number an instant before which none of it comes.
@@ -72,11 +84,13 @@ impl Alarms {
         ALARMS >> which & 1 == 1
     }
 
-    /// The alarms of so many stations, none of them armed.
-    pub(super) fn new(stations: usize) -> Self {
+    /// The alarms of the stations with these crystals, none of them armed.
+    pub(super) fn new(crystals: impl Iterator<Item = Crystal>) -> Self {
+        let all: Vec<_> =
+            crystals.map(|crystal| Waiting { crystal, alarms: [Alarm::OFF; Outbox::DEADLINES] }).collect();
         Self {
-            all: vec![[Alarm::OFF; Outbox::DEADLINES]; stations],
-            users: core::array::from_fn(|_| Vec::with_capacity(stations)),
+            users: core::array::from_fn(|_| Vec::with_capacity(all.len())),
+            all,
             nexts: [Time::MAX; KINDS],
             others: Time::MAX,
             next: Time::MAX,
@@ -88,21 +102,21 @@ impl Alarms {
     }
     /// Arms the one of this number for the reading `at`, whatever it was.
     #[inline]
-    pub(super) fn arm(&mut self, (slot, which): (usize, usize), at: Local, crystal: &Crystal, now: Time) {
-        let alarm = &mut self.all[slot][which];
+    pub(super) fn arm(&mut self, (slot, which): (usize, usize), at: Local, now: Time) {
+        let alarm = &mut self.all[slot].alarms[which];
         alarm.due = at;
         if at < alarm.seen.0 {
-            self.bring_forward((slot, which), crystal, now);
+            self.bring_forward((slot, which), now);
         }
     }
     /// It is armed for an earlier reading than it was looked at for.
     #[inline(never)]
-    fn bring_forward(&mut self, (slot, which): (usize, usize), crystal: &Crystal, now: Time) {
-        let alarm = &mut self.all[slot][which];
-        if alarm.seen == Alarm::UNSEEN && !self.users[which].contains(&(slot as u8)) {
+    fn bring_forward(&mut self, (slot, which): (usize, usize), now: Time) {
+        let Waiting { crystal, alarms } = &mut self.all[slot];
+        if alarms[which].seen.0 == Local::MAX && !self.users[which].contains(&(slot as u8)) {
             self.users[which].push(slot as u8);
         }
-        let comes = alarm.look(crystal, now);
+        let comes = alarms[which].look(crystal, now);
         self.comes(which, comes);
     }
     /// One of this number comes at this instant, or none of it before.
@@ -116,47 +130,48 @@ impl Alarms {
     /// Disarms the one of this number.
     #[inline]
     pub(super) fn disarm(&mut self, (slot, which): (usize, usize)) {
-        self.all[slot][which].due = Local::MAX;
+        self.all[slot].alarms[which].due = Local::MAX;
     }
     /// Disarms all of a station.
     pub(super) fn disarm_all(&mut self, slot: usize) {
-        self.all[slot].iter_mut().for_each(|alarm| alarm.due = Local::MAX);
+        self.all[slot].alarms.iter_mut().for_each(|alarm| alarm.due = Local::MAX);
     }
     /// The station's `crystal` has another rate from `now` on.
     pub(super) fn retune(&mut self, slot: usize, crystal: &Crystal, now: Time) {
+        self.all[slot].crystal.clone_from(crystal);
         for which in 0..KINDS {
-            let comes = self.all[slot][which].look(crystal, now);
+            let comes = self.all[slot].alarms[which].look(crystal, now);
             self.comes(which, comes);
         }
     }
 
     /// Looks at all that may come by `limit`. If [`next`](Self::next) is not later than that now, one comes then.
     #[inline]
-    pub(super) fn look<'a>(&mut self, limit: Time, now: Time, crystal: impl Fn(usize) -> &'a Crystal + Copy) {
+    pub(super) fn look(&mut self, limit: Time, now: Time) {
         if self.nexts[SLOT_TIME] <= limit {
-            self.look_at(SLOT_TIME, (limit, now), crystal);
+            self.look_at(SLOT_TIME, limit, now);
         }
         if self.others <= limit {
-            self.look_at_others((limit, now), crystal);
+            self.look_at_others(limit, now);
         }
         self.next = self.nexts[SLOT_TIME].min(self.others);
     }
     #[inline(never)]
-    fn look_at_others<'a>(&mut self, (limit, now): (Time, Time), crystal: impl Fn(usize) -> &'a Crystal + Copy) {
+    fn look_at_others(&mut self, limit: Time, now: Time) {
         for which in OTHERS {
             if self.nexts[which] <= limit {
-                self.look_at(which, (limit, now), crystal);
+                self.look_at(which, limit, now);
             }
         }
         self.others = self.nexts[OTHERS].iter().fold(Time::MAX, |first, &next| first.min(next));
     }
     /// Looks at all of one number.
     #[inline(never)]
-    fn look_at<'a>(&mut self, which: usize, (limit, now): (Time, Time), crystal: impl Fn(usize) -> &'a Crystal + Copy) {
-        let all = &mut self.all;
-        self.nexts[which] = self.users[which].iter().fold(Time::MAX, |next, &slot| {
-            let slot = usize::from(slot);
-            all[slot][which].look_until(limit, crystal(slot), now).min(next)
+    fn look_at(&mut self, which: usize, limit: Time, now: Time) {
+        let Self { all, users, nexts, .. } = self;
+        nexts[which] = users[which].iter().fold(Time::MAX, |next, &slot| {
+            let Waiting { crystal, alarms } = &mut all[usize::from(slot)];
+            alarms[which].look_until(limit, crystal, now).min(next)
         });
     }
     /// Which one comes first: slot, number and reading. Of several at one instant the one with the least `rank`, then the
@@ -165,7 +180,7 @@ impl Alarms {
         let mut first = None;
         for which in (0..KINDS).filter(|&which| self.nexts[which] == self.next) {
             for slot in self.users[which].iter().map(|&slot| usize::from(slot)) {
-                let Alarm { due, seen } = self.all[slot][which];
+                let Alarm { due, seen } = self.all[slot].alarms[which];
                 let key = (rank(slot), which);
                 if due != Local::MAX && seen.1 == self.next && first.as_ref().is_none_or(|(least, _)| key < *least) {
                     first = Some((key, (slot, which, due)));
@@ -192,54 +207,54 @@ mod tests {
     fn instant(us: i64) -> Time {
         Time::ZERO + Span::from_us(us)
     }
-    /// Alarms of three stations whose crystals run true, and those crystals.
-    fn three() -> (Alarms, [Crystal; 3]) {
-        (Alarms::new(3), core::array::from_fn(|_| Crystal::new(0, Local::ZERO).unwrap()))
+    /// Alarms of three stations whose crystals run true.
+    fn three() -> Alarms {
+        Alarms::new((0..3).map(|_| Crystal::new(0, Local::ZERO).unwrap()))
     }
     /// What comes by `limit`, if anything does; higher slots first.
-    fn first(alarms: &mut Alarms, crystals: &[Crystal], limit: Time) -> Option<(usize, usize, Local)> {
-        alarms.look(limit, Time::ZERO, |slot| &crystals[slot]);
+    fn first(alarms: &mut Alarms, limit: Time) -> Option<(usize, usize, Local)> {
+        alarms.look(limit, Time::ZERO);
         if alarms.next() > limit { None } else { alarms.first(|slot| usize::MAX - slot) }
     }
 
     #[test]
     fn what_is_put_off_or_disarmed_does_not_come() {
-        let (mut alarms, crystals) = three();
+        let mut alarms = three();
         for (slot, us) in [(0, 50), (1, 40), (2, 60)] {
-            alarms.arm((slot, WINDOW), reading(us), &crystals[slot], Time::ZERO);
+            alarms.arm((slot, WINDOW), reading(us), Time::ZERO);
         }
         assert_eq!(alarms.next(), instant(40));
-        alarms.arm((1, WINDOW), reading(140), &crystals[1], Time::ZERO);
+        alarms.arm((1, WINDOW), reading(140), Time::ZERO);
         alarms.disarm((0, WINDOW));
         assert_eq!(alarms.next(), instant(40), "nobody has looked yet");
-        assert_eq!(first(&mut alarms, &crystals, instant(59)), None);
-        assert_eq!(first(&mut alarms, &crystals, instant(60)), Some((2, WINDOW, reading(60))));
+        assert_eq!(first(&mut alarms, instant(59)), None);
+        assert_eq!(first(&mut alarms, instant(60)), Some((2, WINDOW, reading(60))));
         alarms.disarm_all(2);
-        assert_eq!(first(&mut alarms, &crystals, Time::MAX), Some((1, WINDOW, reading(140))));
+        assert_eq!(first(&mut alarms, Time::MAX), Some((1, WINDOW, reading(140))));
         alarms.disarm_all(1);
-        assert_eq!((first(&mut alarms, &crystals, instant(1_000)), alarms.next()), (None, Time::MAX));
+        assert_eq!((first(&mut alarms, instant(1_000)), alarms.next()), (None, Time::MAX));
     }
 
     #[test]
     fn what_is_armed_for_earlier_comes_earlier_also_after_it_was_off() {
-        let (mut alarms, crystals) = three();
-        alarms.arm((0, SLOT_TIME), reading(100), &crystals[0], Time::ZERO);
-        alarms.arm((0, SLOT_TIME), reading(70), &crystals[0], Time::ZERO);
+        let mut alarms = three();
+        alarms.arm((0, SLOT_TIME), reading(100), Time::ZERO);
+        alarms.arm((0, SLOT_TIME), reading(70), Time::ZERO);
         assert_eq!(alarms.next(), instant(70));
         alarms.disarm((0, SLOT_TIME));
-        assert_eq!(first(&mut alarms, &crystals, instant(90)), None);
-        alarms.arm((0, SLOT_TIME), reading(80), &crystals[0], Time::ZERO);
-        assert_eq!(first(&mut alarms, &crystals, instant(90)), Some((0, SLOT_TIME, reading(80))));
+        assert_eq!(first(&mut alarms, instant(90)), None);
+        alarms.arm((0, SLOT_TIME), reading(80), Time::ZERO);
+        assert_eq!(first(&mut alarms, instant(90)), Some((0, SLOT_TIME, reading(80))));
     }
 
     #[test]
     fn at_one_instant_the_rank_decides_and_then_the_number() {
-        let (mut alarms, crystals) = three();
+        let mut alarms = three();
         for (slot, which) in [(0, SLOT_TIME), (1, WINDOW), (2, WINDOW), (2, SLOT_TIME)] {
-            alarms.arm((slot, which), reading(10), &crystals[slot], Time::ZERO);
+            alarms.arm((slot, which), reading(10), Time::ZERO);
         }
         for expected in [(2, SLOT_TIME), (2, WINDOW), (1, WINDOW), (0, SLOT_TIME)] {
-            let (slot, which, due) = first(&mut alarms, &crystals, instant(10)).unwrap();
+            let (slot, which, due) = first(&mut alarms, instant(10)).unwrap();
             assert_eq!((slot, which, due), (expected.0, expected.1, reading(10)));
             alarms.disarm((slot, which));
         }
@@ -247,15 +262,15 @@ mod tests {
 
     #[test]
     fn a_new_rate_moves_an_alarm() {
-        let (mut alarms, mut crystals) = three();
-        alarms.arm((1, WINDOW), reading(1_000_000), &crystals[1], Time::ZERO);
-        crystals[1].set_rate(Time::ZERO, 1_000).unwrap();
-        alarms.retune(1, &crystals[1], Time::ZERO);
-        assert_eq!(alarms.next(), crystals[1].to_true(reading(1_000_000)));
+        let (mut alarms, mut crystal) = (three(), Crystal::new(0, Local::ZERO).unwrap());
+        alarms.arm((1, WINDOW), reading(1_000_000), Time::ZERO);
+        crystal.set_rate(Time::ZERO, 1_000).unwrap();
+        alarms.retune(1, &crystal, Time::ZERO);
+        assert_eq!(alarms.next(), crystal.to_true(reading(1_000_000)));
         assert!(alarms.next() < instant(1_000_000), "faster");
         // Whatever is armed from here on is compared with the new rate.
-        alarms.arm((1, WINDOW), reading(1_000_001), &crystals[1], Time::ZERO);
+        alarms.arm((1, WINDOW), reading(1_000_001), Time::ZERO);
         let expected = Some((1, WINDOW, reading(1_000_001)));
-        assert_eq!(first(&mut alarms, &crystals, crystals[1].to_true(reading(1_000_001))), expected);
+        assert_eq!(first(&mut alarms, crystal.to_true(reading(1_000_001))), expected);
     }
 }
