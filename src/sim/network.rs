@@ -294,7 +294,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let turning = faults.take_turning();
         let mut network = Self {
             rate,
-            alarms: Alarms::new(slots.len()),
+            alarms: Alarms::new(slots.iter().map(|slot| slot.site.crystal.clone())),
             slots,
             by_address,
             attentive: Vec::new(),
@@ -385,9 +385,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.look_at_alarms(end);
         self.alarms.next() <= end
     }
+    #[inline(always)]
     fn look_at_alarms(&mut self, limit: Time) {
-        let Self { alarms, slots, now, .. } = self;
-        alarms.look(limit, *now, |slot| &slots[slot].site.crystal);
+        self.alarms.look(limit, self.now);
     }
 
     /// The next event. False when nothing will ever happen again.
@@ -451,17 +451,19 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// The next event if it is an alarm. A station's other deadlines of the instant come before its alarms.
-    #[inline(never)]
+    #[inline(always)]
     fn alarm<R: Recorder>(&mut self, recorder: &mut R) -> bool {
-        let head = self.queue.peek();
-        self.look_at_alarms(head.map_or(Time::MAX, Key::time));
+        let limit = self.queue.peek().map_or(Time::MAX, Key::time);
+        self.look_at_alarms(limit);
+        self.alarms.next() <= limit && self.ring(recorder)
+    }
+    /// The alarm that comes first, unless another event comes before it.
+    #[inline(never)]
+    fn ring<R: Recorder>(&mut self, recorder: &mut R) -> bool {
         let at = self.alarms.next();
-        if head.is_some_and(|key| key.time() < at) {
-            return false;
-        }
         let Some((slot, which, local)) = self.alarms.first(|slot| self.slots[slot].address) else { return false };
         let key = Key::new(at, Phase::Deadline, self.slots[slot].address.get(), Key::MAX_NUMBER);
-        if head.is_some_and(|head| head < key) {
+        if self.queue.peek().is_some_and(|head| head < key) {
             return false;
         }
         self.now = at;
@@ -613,7 +615,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         for (which, order) in out.orders() {
             match (Alarms::has(which), order) {
-                (true, Order::At(at)) => alarms.arm((index, which), at.max(now), &slot.site.crystal, *instant),
+                (true, Order::At(at)) => alarms.arm((index, which), at.max(now), *instant),
                 (true, Order::Off) => alarms.disarm((index, which)),
                 (false, Order::At(at)) => Self::arm(queue, (index, slot), which, at.max(now), *instant),
                 (false, Order::Off) => slot.deadlines[which].disarm(),

@@ -253,10 +253,11 @@ impl Counts {
         }
     }
 
-    /// Counts what any station, `observer`, observed at `at`.
+    /// Counts what any station, `observer`, observed at `at`; whether it is an event is counted by the caller.
     pub(super) fn station(&mut self, at: Time, observer: Address, what: &Observation) {
         self.live_list.observe(observer, what);
-        if MasterCounts::concerns(what)
+        if !self.masters.is_empty()
+            && MasterCounts::concerns(what)
             && let Some(master) = self.masters.iter_mut().find(|master| master.address == observer)
         {
             master.observe(at, what);
@@ -271,7 +272,6 @@ impl Counts {
             _ => {}
         }
         self.acyclic.station(what);
-        self.network.events += u64::from(what.is_event());
     }
 
     /// The run is over at `end`: closes what is still open.

@@ -355,59 +355,73 @@ impl core::fmt::Display for Subject {
     }
 }
 
+/// A quantity and what a row tells of it.
+type Told<R> = (&'static Quantity, fn(&R) -> Option<Span>);
+
+/// The lines of the registry with one kind of source, in their order. They are known when this is compiled, so that no row
+/// is asked through a pointer.
+macro_rules! told {
+    ($name:ident: [$row:ty; $count:ident] = $source:path) => {
+        const $count: usize = {
+            let (mut count, mut line) = (0, 0);
+            while line < QUANTITIES.len() {
+                count += matches!(QUANTITIES[line].source, $source(_)) as usize;
+                line += 1;
+            }
+            count
+        };
+        const $name: [Told<$row>; $count] = {
+            let mut all: [Told<$row>; $count] = [(&QUANTITIES[0], |_| None); $count];
+            let (mut found, mut line) = (0, 0);
+            while line < QUANTITIES.len() {
+                if let $source(of) = QUANTITIES[line].source {
+                    all[found] = (&QUANTITIES[line], of);
+                    found += 1;
+                }
+                line += 1;
+            }
+            all
+        };
+    };
+}
+told!(OF_NETWORK: [CycleRow; NETWORK] = Source::Network);
+told!(OF_RING: [CycleRow; RING] = Source::Ring);
+told!(OF_SLAVE: [SlaveRow; SLAVE] = Source::Slave);
+told!(OF_LINK: [LinkRow; LINK] = Source::Link);
+
 /// Every quantity of every subject of one network, filled from rows.
 #[derive(Clone, Debug)]
 pub struct Histograms {
     layout: Layout,
-    network: Vec<Recorded<CycleRow>>,
-    slave: Vec<Recorded<SlaveRow>>,
-    link: Vec<Recorded<LinkRow>>,
-}
-
-/// One quantity of all its subjects, in their order.
-#[derive(Debug)]
-struct Recorded<R> {
-    name: &'static str,
-    of: fn(&R) -> Option<Span>,
-    subjects: Vec<Histogram>,
-}
-impl<R> Clone for Recorded<R> {
-    fn clone(&self) -> Self {
-        Self { name: self.name, of: self.of, subjects: self.subjects.clone() }
-    }
+    network: [Histogram; NETWORK],
+    /// None where the master is alone: nothing is kept, and no row is asked.
+    ring: Option<[Histogram; RING]>,
+    slaves: Vec<[Histogram; SLAVE]>,
+    links: Vec<[Histogram; LINK]>,
 }
 
 impl Histograms {
     /// Empty histograms for a network.
     pub fn new(layout: &Layout) -> Self {
-        let mut new = Self { layout: layout.clone(), network: Vec::new(), slave: Vec::new(), link: Vec::new() };
-        for quantity in QUANTITIES {
-            let empty = |_| Histogram::new(quantity.limit, quantity.signed);
-            let (name, subjects) =
-                (quantity.name, quantity.subjects(layout).into_iter().map(empty).collect::<Vec<_>>());
-            match quantity.source {
-                // Without its subject nothing is kept and no row is asked.
-                Source::Ring(_) if subjects.is_empty() => {}
-                Source::Network(of) | Source::Ring(of) => new.network.push(Recorded { name, of, subjects }),
-                Source::Slave(of) => new.slave.push(Recorded { name, of, subjects }),
-                Source::Link(of) => new.link.push(Recorded { name, of, subjects }),
-            }
+        Self {
+            layout: layout.clone(),
+            network: empty(&OF_NETWORK),
+            ring: (!layout.masters().is_empty()).then(|| empty(&OF_RING)),
+            slaves: layout.slaves().iter().map(|_| empty(&OF_SLAVE)).collect(),
+            links: layout.links().iter().map(|_| empty(&OF_LINK)).collect(),
         }
-        new
     }
 
     /// Empty histograms for a network of `layout`, in the memory of these: for many short runs, of which each would
     /// otherwise spend milliseconds on its own.
     pub fn reset(&mut self, layout: &Layout) {
-        // With a ring there is a quantity more than without.
-        if self.layout.masters().is_empty() != layout.masters().is_empty() {
-            *self = Self::new(layout);
-            return;
-        }
         self.layout.clone_from(layout);
-        reset(&mut self.network, layout);
-        reset(&mut self.slave, layout);
-        reset(&mut self.link, layout);
+        self.all_mut().for_each(Histogram::reset);
+        if self.ring.is_none() != layout.masters().is_empty() {
+            self.ring = (!layout.masters().is_empty()).then(|| empty(&OF_RING));
+        }
+        self.slaves.resize_with(layout.slaves().len(), || empty(&OF_SLAVE));
+        self.links.resize_with(layout.links().len(), || empty(&OF_LINK));
     }
 
     /// The network these are of.
@@ -417,18 +431,23 @@ impl Histograms {
     /// The histogram of the quantity `name` of `subject`; none if there is no such quantity or subject.
     pub fn get(&self, name: &str, subject: Subject) -> Option<&Histogram> {
         match subject {
-            Subject::Network => named(&self.network, name)?.first(),
-            Subject::Slave(address) => named(&self.slave, name)?.get(self.layout.slave(address)?),
+            Subject::Network => {
+                named(&self.network, &OF_NETWORK, name).or_else(|| named(self.ring.as_ref()?, &OF_RING, name))
+            }
+            Subject::Slave(address) => named(&self.slaves[self.layout.slave(address)?], &OF_SLAVE, name),
             Subject::Link(publisher, subscriber) => {
-                named(&self.link, name)?.get(self.layout.link(publisher, subscriber)?)
+                named(&self.links[self.layout.link(publisher, subscriber)?], &OF_LINK, name)
             }
         }
     }
     /// Every histogram, in a fixed order. Allocates nothing.
     pub(in crate::study) fn all(&self) -> impl Iterator<Item = &Histogram> {
-        let network = self.network.iter().flat_map(|recorded| &recorded.subjects);
-        let slave = self.slave.iter().flat_map(|recorded| &recorded.subjects);
-        network.chain(slave).chain(self.link.iter().flat_map(|recorded| &recorded.subjects))
+        let network = self.network.iter().chain(self.ring.iter().flatten());
+        network.chain(self.slaves.iter().flatten()).chain(self.links.iter().flatten())
+    }
+    fn all_mut(&mut self) -> impl Iterator<Item = &mut Histogram> {
+        let network = self.network.iter_mut().chain(self.ring.iter_mut().flatten());
+        network.chain(self.slaves.iter_mut().flatten()).chain(self.links.iter_mut().flatten())
     }
     /// Which one of [`Self::all`] the histogram of the quantity `name` of `subject` is.
     pub(in crate::study) fn place(&self, name: &str, subject: Subject) -> Option<usize> {
@@ -448,53 +467,45 @@ impl Histograms {
     /// If `other` is of another network.
     pub fn merge(&mut self, other: &Self) {
         assert_eq!(self.layout, other.layout, "histograms of different networks");
-        merge(&mut self.network, &other.network);
-        merge(&mut self.slave, &other.slave);
-        merge(&mut self.link, &other.link);
+        self.all_mut().zip(other.all()).for_each(|(mine, theirs)| mine.merge(theirs));
     }
 }
 
-fn named<'a, R>(all: &'a [Recorded<R>], name: &str) -> Option<&'a [Histogram]> {
-    all.iter().find(|recorded| recorded.name == name).map(|recorded| &recorded.subjects[..])
+/// Empty histograms of one subject.
+fn empty<R, const N: usize>(of: &[Told<R>; N]) -> [Histogram; N] {
+    of.map(|(quantity, _)| Histogram::new(quantity.limit, quantity.signed))
 }
-
-/// Empties everything, with as many subjects as `layout` has.
-fn reset<R>(all: &mut [Recorded<R>], layout: &Layout) {
-    for recorded in all {
-        let quantity = Quantity::named(recorded.name).expect("a line of the registry");
-        recorded.subjects.iter_mut().for_each(Histogram::reset);
-        let empty = || Histogram::new(quantity.limit, quantity.signed);
-        recorded.subjects.resize_with(quantity.subjects(layout).len(), empty);
-    }
+/// The histogram of the quantity `name` among those of one subject.
+fn named<'a, R, const N: usize>(all: &'a [Histogram; N], of: &[Told<R>; N], name: &str) -> Option<&'a Histogram> {
+    all.iter().zip(of).find(|(_, (quantity, _))| quantity.name == name).map(|(histogram, _)| histogram)
 }
-
-fn merge<R>(all: &mut [Recorded<R>], others: &[Recorded<R>]) {
-    for (mine, theirs) in all.iter_mut().zip(others) {
-        mine.subjects.iter_mut().zip(&theirs.subjects).for_each(|(mine, theirs)| mine.merge(theirs));
-    }
-}
-
-/// Records what a row tells of the subject of number `index`.
-fn record<R>(all: &mut [Recorded<R>], index: usize, row: &R) {
-    for recorded in all {
-        if let Some(value) = (recorded.of)(row) {
-            recorded.subjects[index].record(value);
+/// Records what a row tells of one subject.
+#[inline]
+fn record<R, const N: usize>(all: &mut [Histogram; N], of: &[Told<R>; N], row: &R) {
+    for (histogram, (_, of)) in all.iter_mut().zip(of) {
+        if let Some(value) = of(row) {
+            histogram.record(value);
         }
     }
 }
 
 impl Sink for Histograms {
+    #[inline]
     fn cycle(&mut self, row: &CycleRow) {
-        record(&mut self.network, 0, row);
+        record(&mut self.network, &OF_NETWORK, row);
+        if let Some(ring) = &mut self.ring {
+            record(ring, &OF_RING, row);
+        }
     }
+    #[inline]
     fn slave(&mut self, row: &SlaveRow) {
         if let Some(index) = self.layout.slave(row.slave) {
-            record(&mut self.slave, index, row);
+            record(&mut self.slaves[index], &OF_SLAVE, row);
         }
     }
     fn link(&mut self, row: &LinkRow) {
         if let Some(index) = self.layout.link(row.publisher, row.subscriber) {
-            record(&mut self.link, index, row);
+            record(&mut self.links[index], &OF_LINK, row);
         }
     }
 }

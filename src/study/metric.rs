@@ -43,6 +43,10 @@ pub struct Metrics<S, V> {
     /// Where the latches of this cycle belong, per different T_I.
     grid: Vec<Grid>,
     slaves: Vec<Watch>,
+    /// Number of a slave by its address, [`NO_SLAVE`] where there is none.
+    numbers: [u8; 256],
+    /// The locked encoders of this cycle.
+    skew: Skew,
     links: Vec<LinkWatch>,
     /// Events of the instant that is going on: a cycle that begins at this instant is theirs.
     held: Vec<EventRow>,
@@ -50,6 +54,9 @@ pub struct Metrics<S, V> {
 
 /// Events of one instant that fit without growing: a few of every station.
 const HELD: usize = 512;
+
+/// More than there can be slaves.
+const NO_SLAVE: u8 = u8::MAX;
 
 /// The nominal latch instant of all slaves with one T_I.
 #[derive(Clone, Debug)]
@@ -66,8 +73,6 @@ struct Watch {
     encoder: bool,
     /// Number of its T_I in [`Metrics::grid`].
     grid: usize,
-    /// Latch offset in counts \[steps\].
-    offset_counts: f64,
     /// The last locked latch of this cycle.
     latched: Option<Time>,
     /// The same of the cycle before: what the replies of this cycle carry (Model: D8).
@@ -105,8 +110,13 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
             received: false,
         };
         let links = layout.links().iter().map(link).collect();
+        let mut numbers = [NO_SLAVE; 256];
+        for (number, slave) in (0..NO_SLAVE).zip(layout.slaves()) {
+            numbers[usize::from(slave.address.get())] = number;
+        }
         let held = Vec::with_capacity(HELD);
-        Self { counts: Counts::new(&layout), open: None, delay: None, grid, slaves, links, held, layout, shafts, sink }
+        let (counts, skew) = (Counts::new(&layout), Skew::NONE);
+        Self { counts, open: None, delay: None, grid, slaves, numbers, skew, links, held, layout, shafts, sink }
     }
 
     /// What was counted until now.
@@ -169,16 +179,16 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
 
     /// Sends the rows of the cycle under way off and makes everything ready for the next.
     fn flush(&mut self) {
-        let Some(mut row) = self.open.take() else { return };
+        let Some(row) = &mut self.open else { return };
         if let Some(t_dp) = row.t_dp {
             self.counts.network.cycle_times.add(t_dp);
         }
-        (row.latch_skew, row.skew_counts) = skew(&self.slaves);
+        (row.latch_skew, row.skew_counts) = self.skew.take();
         if let Some(counts) = row.skew_counts {
             let largest = &mut self.counts.network.skew_counts;
             *largest = Some(largest.map_or(counts, |before| before.max(counts)));
         }
-        self.sink.cycle(&row);
+        self.sink.cycle(row);
         for slave in &mut self.slaves {
             (slave.row.cycle, slave.row.t0) = (row.cycle, row.t0);
             self.sink.slave(&slave.row);
@@ -191,19 +201,26 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
             }
             (link.received, link.row.age) = (false, None);
         }
+        self.open = None;
     }
 
-    /// Takes what may have to be counted; `slave` is the number of the station if it is a slave.
+    /// Takes what may have to be counted, when the instant of the events before it may be over.
     #[inline(never)]
-    fn count(&mut self, slave: Option<usize>, stamp: &Stamp<'_>, what: &Observation) {
-        self.counts.station(stamp.at, stamp.station, what);
-        if stamp.station == self.layout.master {
-            self.master(stamp, what);
-        } else if let Some(index) = slave {
-            self.slave(index, stamp, what);
+    fn count(&mut self, at: Time, station: Address, crystal: &Crystal, what: &Observation) {
+        if self.held.first().is_some_and(|event| event.at < at) {
+            self.release();
         }
-        if what.is_event() {
-            self.held.push(EventRow { at: stamp.at, cycle: 0, station: stamp.station, what: *what });
+        let event = what.is_event();
+        self.counts.station(at, station, what);
+        let stamp = Stamp { at, station, crystal };
+        if station == self.layout.master {
+            self.master(&stamp, what);
+        } else if let Some(index) = self.layout.slave(station) {
+            self.slave(index, &stamp, what);
+        }
+        if event {
+            self.counts.network.events += 1;
+            self.held.push(EventRow { at, cycle: 0, station, what: *what });
         }
     }
     /// What the master observed.
@@ -216,12 +233,8 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
         if let Observation::ClockLate { by } = *what {
             self.delay = Some(by);
         }
-        let Some(open) = &mut self.open else { return };
-        match *what {
-            Observation::ExchangeDone { t_dx, .. } => open.t_dx = (t_dx > Span::ZERO).then_some(t_dx),
-            Observation::CycleSpare { acyclic, spare } => (open.acyclic, open.spare) = (Some(acyclic), Some(spare)),
-            Observation::Retry { .. } => open.retries += 1,
-            _ => {}
+        if let Some(open) = &mut self.open {
+            open.observe(what);
         }
     }
 
@@ -242,12 +255,13 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
         }
         self.slaves[index].observe(what);
     }
-    /// Takes what a slave observes in every cycle in which all is well: it is in the rows and in no count. Whether it was
+    /// Takes what a station observes in every cycle in which all is well: it is in the rows and in no count. Whether it was
     /// that.
     #[allow(clippy::inline_always)] // See `observe`.
     #[inline(always)]
-    fn routine(&mut self, index: usize, at: Time, what: &Observation) -> bool {
-        let slave = &mut self.slaves[index];
+    fn routine(&mut self, at: Time, station: Address, what: &Observation) -> bool {
+        let number = usize::from(self.numbers[usize::from(station.get())]);
+        let Some(slave) = self.slaves.get_mut(number) else { return self.routine_of_cycle(station, what) };
         match *what {
             Observation::Clock { verdict: ClockVerdict::Hit, error, period, window, counter } => {
                 slave.row.pll_error = Some(error);
@@ -257,24 +271,40 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
             Observation::Latch { locked, inputs } => {
                 (slave.row.g1_zsw, slave.row.xist1, slave.row.xist2) = (inputs.g1_zsw, inputs.xist1, inputs.xist2);
                 if locked {
-                    self.latch(index, at);
+                    self.latch(number, at);
                 }
             }
             _ => return false,
         }
         true
     }
+    /// The same of the master. Where several share the token, it counts for each of them.
+    #[inline]
+    fn routine_of_cycle(&mut self, station: Address, what: &Observation) -> bool {
+        let (Observation::ExchangeDone { .. } | Observation::CycleSpare { .. }, Some(open)) = (what, &mut self.open)
+        else {
+            return false;
+        };
+        let alone = station == self.layout.master && self.layout.masters().is_empty();
+        if alone {
+            open.observe(what);
+        }
+        alone
+    }
 
     /// A locked latch. The first one of a cycle counts for the offset; a second one is possible only where the next
     /// SYNCH is later than T_I.
-    #[inline]
-    fn latch(&mut self, index: usize, at: Time) {
-        let slave = &mut self.slaves[index];
+    #[allow(clippy::inline_always)] // See `observe`.
+    #[inline(always)]
+    fn latch(&mut self, number: usize, at: Time) {
+        let slave = &mut self.slaves[number];
         slave.latched = Some(at);
         if self.open.is_some() && slave.row.latch_offset.is_none() {
             let offset = at - self.grid[slave.grid].latch;
             slave.row.latch_offset = Some(offset);
-            slave.offset_counts = offset.as_s() * self.shafts.speed(slave.row.slave, at);
+            if slave.encoder {
+                self.skew.add(offset, offset.as_s() * self.shafts.speed(slave.row.slave, at));
+            }
         }
     }
 
@@ -301,6 +331,10 @@ impl<S: Sink, V: Shafts> Metrics<S, V> {
 
 impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
     fn telegram(&mut self, telegram: &Transmission<'_>) {
+        // Nobody else asks for the reply.
+        if self.links.is_empty() {
+            return;
+        }
         let [0x68, _, _, _, destination, ..] = telegram.octets else { return };
         if destination & 0x7F == Address::BROADCAST.get()
             && let Some(index) = self.layout.slave(telegram.sender)
@@ -313,28 +347,56 @@ impl<S: Sink, V: Shafts> Recorder for Metrics<S, V> {
     #[allow(clippy::inline_always)]
     #[inline(always)]
     fn observe(&mut self, stamp: Stamp<'_>, what: &Observation) {
-        if self.held.first().is_some_and(|event| event.at < stamp.at) {
-            self.release();
-        }
-        let slave = self.layout.slave(stamp.station);
-        if !slave.is_some_and(|index| self.routine(index, stamp.at, what)) {
-            self.count(slave, &stamp, what);
+        let Stamp { at, station, crystal } = stamp;
+        if !self.routine(at, station, what) {
+            self.count(at, station, crystal, what);
         }
     }
 }
 
-/// Largest minus smallest latch offset over the locked encoders, as time and in counts (Model: D9).
-fn skew(slaves: &[Watch]) -> (Option<Span>, Option<f64>) {
-    let mut locked = 0;
-    let (mut low, mut high) = (Span::MAX, -Span::MAX);
-    let (mut low_counts, mut high_counts) = (f64::INFINITY, f64::NEG_INFINITY);
-    for slave in slaves.iter().filter(|slave| slave.encoder) {
-        let Some(offset) = slave.row.latch_offset else { continue };
-        locked += 1;
-        (low, high) = (low.min(offset), high.max(offset));
-        (low_counts, high_counts) = (low_counts.min(slave.offset_counts), high_counts.max(slave.offset_counts));
+/// Latch offsets of the locked encoders of one cycle, as time and in counts \[steps\] (Model: D9).
+#[derive(Clone, Copy, Debug)]
+struct Skew {
+    locked: u32,
+    low: Span,
+    high: Span,
+    low_counts: f64,
+    high_counts: f64,
+}
+impl Skew {
+    const NONE: Self = Self {
+        locked: 0,
+        low: Span::MAX,
+        high: Span::from_ticks(-Span::MAX.ticks()),
+        low_counts: f64::INFINITY,
+        high_counts: f64::NEG_INFINITY,
+    };
+
+    fn add(&mut self, offset: Span, counts: f64) {
+        self.locked += 1;
+        (self.low, self.high) = (self.low.min(offset), self.high.max(offset));
+        // Compared as numbers, since none is something else.
+        self.low_counts = if counts < self.low_counts { counts } else { self.low_counts };
+        self.high_counts = if counts > self.high_counts { counts } else { self.high_counts };
     }
-    if locked < 2 { (None, None) } else { (Some(high - low), Some(high_counts - low_counts)) }
+    /// Largest minus smallest, if there are two; then none is left.
+    fn take(&mut self) -> (Option<Span>, Option<f64>) {
+        let Self { locked, low, high, low_counts, high_counts } = core::mem::replace(self, Self::NONE);
+        if locked < 2 { (None, None) } else { (Some(high - low), Some(high_counts - low_counts)) }
+    }
+}
+
+impl CycleRow {
+    /// Takes what the master observes in this cycle.
+    #[inline]
+    fn observe(&mut self, what: &Observation) {
+        match *what {
+            Observation::ExchangeDone { t_dx, .. } => self.t_dx = (t_dx > Span::ZERO).then_some(t_dx),
+            Observation::CycleSpare { acyclic, spare } => (self.acyclic, self.spare) = (Some(acyclic), Some(spare)),
+            Observation::Retry { .. } => self.retries += 1,
+            _ => {}
+        }
+    }
 }
 
 impl Watch {
@@ -359,7 +421,7 @@ impl Watch {
             xist1: 0,
             xist2: 0,
         };
-        Self { row, encoder: slave.encoder, grid, offset_counts: 0.0, latched: None, travelling: None, reply: None }
+        Self { row, encoder: slave.encoder, grid, latched: None, travelling: None, reply: None }
     }
 
     /// The clock recovery took a SYNCH, or noticed that one is missing.
@@ -371,7 +433,7 @@ impl Watch {
         (self.row.mls, self.row.sls, self.row.life_counter) = (mls, sls, counter);
     }
     fn next_cycle(&mut self) {
-        (self.row.pll_error, self.row.latch_offset, self.offset_counts) = (None, None, 0.0);
+        (self.row.pll_error, self.row.latch_offset) = (None, None);
         (self.travelling, self.latched, self.reply) = (self.latched, None, None);
     }
 
@@ -423,8 +485,9 @@ impl Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observation::{Inputs, SlaveCause};
+    use crate::observation::{Inputs, MasterClass, SlaveCause};
     use crate::sim::record::Origin;
+    use crate::study::layout::MasterLayout;
     use crate::study::sample::{self, address};
 
     /// Keeps every row.
@@ -509,13 +572,36 @@ mod tests {
         let latch = |locked| Observation::Latch { locked, inputs };
         let mut metrics = Told::new(0).metrics;
         for what in [clock(ClockVerdict::Hit), set_point(true), latch(true), latch(false)] {
-            assert!(metrics.routine(0, at(7), &what) && !what.is_event());
+            assert!(metrics.routine(at(7), address(3), &what) && !what.is_event());
             counts.station(at(7), address(3), &what);
             counts.slaves[0].observe(at(7), 9, &what);
         }
         assert_eq!(counts, before);
-        assert!(!metrics.routine(0, at(7), &clock(ClockVerdict::Outside)));
-        assert!(!metrics.routine(0, at(7), &set_point(false)));
+        assert!(!metrics.routine(at(7), address(3), &clock(ClockVerdict::Outside)));
+        assert!(!metrics.routine(at(7), address(3), &set_point(false)));
+    }
+
+    #[test]
+    fn what_the_only_master_tells_of_its_cycle_is_in_no_count() {
+        let layout = sample::layout();
+        let mut counts = Counts::new(&layout);
+        let before = counts.clone();
+        let done = Observation::ExchangeDone { t_dx: Span::from_us(449), retries: 0 };
+        let spare = Observation::CycleSpare { acyclic: Span::from_us(51), spare: Span::from_us(488) };
+        let mut told = Told::new(0);
+        assert!(!told.metrics.routine(at(0), address(1), &done), "before the first cycle");
+        told.cycle(0, 0);
+        for what in [done, spare] {
+            assert!(!told.metrics.routine(at(7), address(2), &what), "nobody's cycle");
+            assert!(told.metrics.routine(at(7), address(1), &what) && !what.is_event());
+            counts.station(at(7), address(1), &what);
+            counts.master(&what, &layout);
+        }
+        assert_eq!(counts, before);
+        assert!(!told.metrics.routine(at(7), address(1), &Observation::Retry { slave: address(3) }));
+        let master = MasterLayout { address: address(1), class: MasterClass::One, slaves: vec![] };
+        told.metrics.layout = layout.with_masters(vec![master]);
+        assert!(!told.metrics.routine(at(7), address(1), &done), "each master counts it");
     }
 
     #[test]

@@ -112,7 +112,7 @@ pub trait Sink {
     fn slave(&mut self, _row: &SlaveRow) {}
     /// A link's part of a cycle is complete. Comes after the slaves'.
     fn link(&mut self, _row: &LinkRow) {}
-    /// Something rare happened. Comes as soon as its instant is over.
+    /// Something rare happened. Comes once its instant is over, before the rows of a cycle that begins later.
     fn event(&mut self, _row: &EventRow) {}
 }
 
