@@ -258,14 +258,18 @@ impl<E: Copy> NearQueue<E> {
     #[inline(never)]
     fn insert(&mut self, next: Next<E>) {
         let mut place = self.stack.len();
-        while place > 0 && self.stack[place - 1].key < next.key {
+        self.stack.push(next);
+        let highest = place.saturating_sub(STEPS);
+        while place > highest && self.stack[place - 1].key < next.key {
+            self.stack[place] = self.stack[place - 1];
             place -= 1;
-            if self.stack.len() - place == STEPS {
-                place = self.stack.partition_point(|waiting| waiting.key > next.key);
-                break;
-            }
         }
-        self.stack.insert(place, next);
+        if place == highest && place > 0 {
+            let above = self.stack[..place].partition_point(|waiting| waiting.key > next.key);
+            self.stack.copy_within(above..place, above + 1);
+            place = above;
+        }
+        self.stack[place] = next;
     }
     /// Puts an event into a row, not behind the last one.
     #[inline(never)]
@@ -293,11 +297,11 @@ impl<E: Copy> NearQueue<E> {
     fn follow(&mut self, stands_for: u8) {
         let Some(row) = self.rows.get_mut(usize::from(stands_for)) else { return self.follow_in_heap() };
         if row.begin == row.end {
-            row.last = Key::NEVER;
+            (row.begin, row.end, row.last) = (0, 0, Key::NEVER);
             return;
         }
-        let next = row.ring[usize::from(row.begin)];
-        row.begin = row.begin.wrapping_add(1);
+        let next = row.list[usize::from(row.begin)];
+        row.begin += 1;
         row.first = next.key;
         self.stack(next);
     }
@@ -348,8 +352,8 @@ impl<E: Copy + Default> Queue<E> for NearQueue<E> {
 /// Events that come, nearly always, in the order in which they are pushed. The first one is not here but on the stack.
 #[derive(Clone, Debug)]
 struct Row<E> {
-    /// A ring, ascending from `begin` to `end`.
-    ring: Box<[Next<E>; ROOM]>,
+    /// Ascending from `begin` to `end`, of which neither is beyond the list.
+    list: Box<[Next<E>; ROOM]>,
     begin: u8,
     end: u8,
     /// Key of the event on the stack.
@@ -370,24 +374,24 @@ enum Squeezed {
 
 impl<E: Copy + Default> Default for Row<E> {
     fn default() -> Self {
-        let ring = Box::new([Next { key: Key::NEVER, event: E::default(), stands_for: 0 }; ROOM]);
-        Self { ring, begin: 0, end: 0, first: Key::NEVER, last: Key::NEVER }
+        let list = Box::new([Next { key: Key::NEVER, event: E::default(), stands_for: 0 }; ROOM]);
+        Self { list, begin: 0, end: 0, first: Key::NEVER, last: Key::NEVER }
     }
 }
 impl<E: Copy> Row<E> {
     const fn len(&self) -> usize {
-        self.end.wrapping_sub(self.begin) as usize
+        (self.end - self.begin) as usize
     }
     const fn is_full(&self) -> bool {
-        self.end.wrapping_add(1) == self.begin
+        self.end == u8::MAX
     }
     /// Puts an event behind all others. False, and nothing is done, where it does not belong there.
     #[inline(always)]
     fn push(&mut self, next: Next<E>) -> bool {
         let is_last = next.key > self.last && !self.is_full();
         if is_last {
-            self.ring[usize::from(self.end)] = next;
-            self.end = self.end.wrapping_add(1);
+            self.list[usize::from(self.end)] = next;
+            self.end += 1;
             self.last = next.key;
         }
         is_last
@@ -398,21 +402,26 @@ impl<E: Copy> Row<E> {
             (self.first, self.last) = (key, key);
             return Squeezed::First;
         }
+        if self.is_full() {
+            self.list.copy_within(usize::from(self.begin)..usize::from(self.end), 0);
+            (self.begin, self.end) = (0, self.end - self.begin);
+        }
         if key < self.first || self.is_full() {
             return Squeezed::Out;
         }
-        let mut place = self.end;
-        while place != self.begin {
-            let before = place.wrapping_sub(1);
-            let waiting = self.ring[usize::from(before)];
-            if waiting.key < key {
-                break;
-            }
-            self.ring[usize::from(place)] = waiting;
+        let (begin, mut place) = (usize::from(self.begin), usize::from(self.end));
+        let nearest = begin.max(place.saturating_sub(STEPS));
+        while place > nearest && self.list[place - 1].key > key {
+            self.list[place] = self.list[place - 1];
+            place -= 1;
+        }
+        if place == nearest && place > begin {
+            let before = begin + self.list[begin..place].partition_point(|waiting| waiting.key < key);
+            self.list.copy_within(before..place, before + 1);
             place = before;
         }
-        self.ring[usize::from(place)] = next;
-        self.end = self.end.wrapping_add(1);
+        self.list[place] = next;
+        self.end += 1;
         self.last = self.last.max(key);
         Squeezed::In
     }
