@@ -269,7 +269,7 @@ impl Slave {
             (Some(Sap::SLAVE_DIAG), Some(Sap::MASTER_MS0)) => self.slave_diag(now, header, app, out),
             (Some(Sap::GET_CFG), Some(Sap::MASTER_MS0)) => {
                 let config = &self.identity.config;
-                self.passive.reply(now, header, Status::Dl, config.len(), out, |du| du.copy_from_slice(config));
+                self.passive.reply(now, header, (Status::Dl, config.len()), out, |du| du.copy_from_slice(config));
             }
             (Some(Sap::SET_PRM), Some(Sap::MASTER_MS0)) => self.set_prm(now, header, du, app, out),
             (Some(Sap::CHK_CFG), Some(Sap::MASTER_MS0)) => self.chk_cfg(now, header, du, app, out),
@@ -278,7 +278,7 @@ impl Slave {
             }
             (Some(Sap::RD_OUTP), Some(Sap::MASTER_MS0)) if self.state == SlaveState::DataExch => {
                 let outputs = self.image.octets();
-                self.passive.reply(now, header, Status::Dl, outputs.len(), out, |du| du.copy_from_slice(outputs));
+                self.passive.reply(now, header, (Status::Dl, outputs.len()), out, |du| du.copy_from_slice(outputs));
             }
             (Some(Sap::MS1), Some(Sap::MASTER_MS1)) => self.ms1(now, header, du, app, out),
             (Some(dsap), Some(ssap)) if self.ms2.has(dsap) => {
@@ -308,7 +308,7 @@ impl Slave {
     }
     #[cold]
     fn refuse(&mut self, now: Local, request: &Header, out: &mut Outbox) {
-        self.passive.reply(now, request, Status::Rs, 0, out, |_| ());
+        self.passive.reply(now, request, (Status::Rs, 0), out, |_| ());
     }
     /// Whether another master than `sa` has this slave.
     fn is_foreign(&self, sa: Address) -> bool {
@@ -340,7 +340,7 @@ impl Slave {
         if self.image.held().is_some() {
             return self.reply_held_or_fresh(now, header, status, app, out);
         }
-        self.passive.reply(now, header, status, self.identity.inputs.into(), out, |du| app.inputs(du));
+        self.passive.reply(now, header, (status, self.identity.inputs.into()), out, |du| app.inputs(du));
     }
     /// Replies with the inputs that Freeze holds, or else with those of now.
     #[cold]
@@ -353,7 +353,7 @@ impl Slave {
         out: &mut Outbox,
     ) {
         let held = self.image.held();
-        self.passive.reply(now, request, status, self.identity.inputs.into(), out, |du| match held {
+        self.passive.reply(now, request, (status, self.identity.inputs.into()), out, |du| match held {
             Some(held) => du.copy_from_slice(held),
             None => app.inputs(du),
         });
@@ -364,7 +364,7 @@ impl Slave {
         app.diagnosis(&mut device);
         let diagnosis = self.diagnosis(&device);
         let (standard, extended) = (diagnosis.emit(), diagnosis.extended);
-        self.passive.reply(now, request, Status::Dl, standard.len() + extended.len(), out, |du| {
+        self.passive.reply(now, request, (Status::Dl, standard.len() + extended.len()), out, |du| {
             du[..standard.len()].copy_from_slice(&standard);
             du[standard.len()..].copy_from_slice(extended);
         });
@@ -536,7 +536,7 @@ impl Slave {
 fn answer(passive: &mut Passive, now: Local, request: &Header, answer: Answer<'_>, out: &mut Outbox) {
     match answer {
         Answer::Acknowledge => passive.acknowledge(now, out),
-        Answer::Data(pdu) => passive.reply(now, request, Status::Dl, pdu.len(), out, |du| du.copy_from_slice(pdu)),
-        Answer::Refuse(status) => passive.reply(now, request, status, 0, out, |_| ()),
+        Answer::Data(pdu) => passive.reply(now, request, (Status::Dl, pdu.len()), out, |du| du.copy_from_slice(pdu)),
+        Answer::Refuse(status) => passive.reply(now, request, (status, 0), out, |_| ()),
     }
 }

@@ -153,7 +153,8 @@ impl Passive {
         });
     }
 
-    /// Answers `request`, which came in this step, with `len` octets of data that `write` fills in, as a publisher to 127.
+    /// Answers `request`, which came in this step, with a status and so many octets of data, which `write` fills in; as a
+    /// publisher to 127.
     ///
     /// # Panics
     /// Above 244 octets: a bug of the caller.
@@ -161,8 +162,7 @@ impl Passive {
         &mut self,
         now: Local,
         request: &Header,
-        status: Status,
-        len: usize,
+        (status, len): (Status, usize),
         out: &mut Outbox,
         write: impl FnOnce(&mut [u8]),
     ) {
@@ -213,7 +213,7 @@ mod tests {
         let mut out = Outbox::new();
         let now = Local::from_ticks(1_000);
         if let Indication::Request { header, .. } = station.heard(now, &frame.telegram().unwrap(), &mut out) {
-            station.reply(now, header, Status::Dl, 1, &mut out, |du| du[0] = value);
+            station.reply(now, header, (Status::Dl, 1), &mut out, |du| du[0] = value);
         }
         let (send, frame) = out.sending()?;
         assert_eq!(send.at - now, BitRate::M12.span(Tbit(30)), "T_SDR");
@@ -252,7 +252,7 @@ mod tests {
         let telegram = frame.telegram().unwrap();
         let indication = station.heard(Local::ZERO, &telegram, &mut out);
         let Indication::Request { header, .. } = indication else { panic!("{indication:?}") };
-        station.reply(Local::ZERO, header, Status::Dl, 1, &mut out, |_| ());
+        station.reply(Local::ZERO, header, (Status::Dl, 1), &mut out, |_| ());
         assert_eq!(out.sending().unwrap().1.octets()[4], 127);
     }
 

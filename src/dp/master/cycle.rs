@@ -242,8 +242,9 @@ impl<A: Application> Master<A> {
         let longest = exchanging.map(|handler| handler.params().min_interval).max();
         self.polling.next.max(self.polling.began + longest.unwrap_or(Span::ZERO))
     }
-    /// Of a free-running master: whether T_TH is over before Data_Exchange with `slave`, or the slave may not be asked again for longer than T_SL,
-    /// because the token was away between it and those before it: then the token goes on, and later so does the cycle.
+    /// Of a free-running master: whether T_TH is over before Data_Exchange with `slave`, or the slave may not be asked
+    /// again for longer than T_SL, because the token was away between it and those before it: then the token goes on, and
+    /// later so does the cycle.
     #[cold]
     pub(super) fn stops_before(&mut self, slave: usize, now: Local, out: &mut Outbox) -> bool {
         if self.is_alone() {
