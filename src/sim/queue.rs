@@ -258,18 +258,14 @@ impl<E: Copy> NearQueue<E> {
     #[inline(never)]
     fn insert(&mut self, next: Next<E>) {
         let mut place = self.stack.len();
-        self.stack.push(next);
-        let highest = place.saturating_sub(STEPS);
-        while place > highest && self.stack[place - 1].key < next.key {
-            self.stack[place] = self.stack[place - 1];
+        while place > 0 && self.stack[place - 1].key < next.key {
             place -= 1;
+            if self.stack.len() - place == STEPS {
+                place = self.stack.partition_point(|waiting| waiting.key > next.key);
+                break;
+            }
         }
-        if place == highest && place > 0 {
-            let above = self.stack[..place].partition_point(|waiting| waiting.key > next.key);
-            self.stack.copy_within(above..place, above + 1);
-            place = above;
-        }
-        self.stack[place] = next;
+        self.stack.insert(place, next);
     }
     /// Puts an event into a row, not behind the last one.
     #[inline(never)]
