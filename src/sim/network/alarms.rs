@@ -32,21 +32,6 @@ impl Alarm {
         self.seen = if self.due == Local::MAX { Self::UNSEEN } else { (self.due, crystal.to_true(self.due).max(now)) };
         self.seen.1
     }
-    /// The same if that is by `limit`; otherwise an instant before which it does not come is enough.
-    #[inline]
-    fn look_until(&mut self, limit: Time, crystal: &Crystal, now: Time) -> Time {
-        if self.due == Local::MAX {
-            self.seen = Self::UNSEEN;
-            return Time::MAX;
-        }
-        match crystal.not_before(self.due) {
-            Some(earliest) if earliest > limit => {
-                self.seen = (self.due, earliest);
-                earliest
-            }
-            _ => self.look(crystal, now),
-        }
-    }
 }
 
 /// What one station waits for, and the crystal that it waits by.
@@ -55,6 +40,26 @@ struct Waiting {
     crystal: Crystal,
     /// By number; what is no timer is never armed.
     alarms: [Alarm; Outbox::DEADLINES],
+}
+
+impl Waiting {
+    /// Finds out when the alarm of this number comes, not before `now`, if that is by `limit`; otherwise an instant before
+    /// which it does not come is enough.
+    #[inline]
+    fn look(&mut self, which: usize, limit: Time, now: Time) -> Time {
+        let Self { crystal, alarms } = self;
+        let alarm = &mut alarms[which];
+        if alarm.due == Local::MAX {
+            alarm.seen = Alarm::UNSEEN;
+            return Time::MAX;
+        }
+        let earliest = crystal.not_before(alarm.due);
+        if earliest <= limit {
+            return alarm.look(crystal, now);
+        }
+        alarm.seen = (alarm.due, earliest);
+        earliest
+    }
 }
 
 /// The alarms of all stations.
@@ -165,14 +170,19 @@ impl Alarms {
         }
         self.others = self.nexts[OTHERS].iter().fold(Time::MAX, |first, &next| first.min(next));
     }
-    /// Looks at all of one number.
-    #[inline(never)]
+    /// Looks at all of one number. Mostly one station has a slot time, the only master: that needs no walk.
+    #[inline]
     fn look_at(&mut self, which: usize, limit: Time, now: Time) {
-        let Self { all, users, nexts, .. } = self;
-        nexts[which] = users[which].iter().fold(Time::MAX, |next, &slot| {
-            let Waiting { crystal, alarms } = &mut all[usize::from(slot)];
-            alarms[which].look_until(limit, crystal, now).min(next)
-        });
+        self.nexts[which] = match self.users[which][..] {
+            [slot] => self.all[usize::from(slot)].look(which, limit, now),
+            _ => self.look_at_many(which, limit, now),
+        };
+    }
+    #[inline(never)]
+    fn look_at_many(&mut self, which: usize, limit: Time, now: Time) -> Time {
+        let Self { all, users, .. } = self;
+        let looks = users[which].iter().map(|&slot| all[usize::from(slot)].look(which, limit, now));
+        looks.fold(Time::MAX, Time::min)
     }
     /// Which one comes first: slot, number and reading. Of several at one instant the one with the least `rank`, then the
     /// one with the least number.
