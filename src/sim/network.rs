@@ -234,8 +234,9 @@ pub struct Network<S: Station, Q = NearQueue<NetworkEvent>> {
     turning: Vec<Turning<S::Command>>,
     next_turn: u64,
     now: Time,
-    /// Nothing later than this happens in the running call.
+    /// Nothing later than this happens in the running call, and no more events.
     limit: Time,
+    left: u64,
     /// Cycles that the first station has begun, with a lost SYNCH too.
     clocks: u64,
     out: Outbox,
@@ -315,6 +316,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             next_turn: u64::MAX,
             now: Time::ZERO,
             limit: Time::MAX,
+            left: 0,
             clocks: 0,
             out: Outbox::new(),
         };
@@ -356,13 +358,15 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         Some(&self.slots[usize::from(slot)].site.machine)
     }
 
-    /// Runs for at most `budget` events; a telegram that reaches many stations with nothing in between is one. Tells whether `until` is reached.
+    /// Runs for at most `budget` events. Tells whether `until` is reached.
     pub fn run<R: Recorder>(&mut self, until: Until, budget: u64, recorder: &mut R) -> bool {
         self.limit = match until {
             Until::Cycle(_) => Time::MAX,
             Until::Time(end) => end,
         };
-        for _ in 0..budget {
+        self.left = budget;
+        while self.left > 0 {
+            self.left -= 1;
             let over = match until {
                 Until::Cycle(cycle) => self.clocks > cycle,
                 Until::Time(end) => !self.goes_on_until(end),
@@ -420,10 +424,11 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 self.carry_out(slot, now, recorder);
             }
             let Some((key, listener)) = onward else { return true };
-            if !self.is_next(key) {
+            if self.left == 0 || !self.is_next(key) {
                 self.queue.push(Lane::Soon, key, NetworkEvent { number, event, slot: listener, rank });
                 return true;
             }
+            self.left -= 1;
             (self.now, slot) = (key.time(), listener.into());
         }
     }
