@@ -208,13 +208,14 @@ impl Bus {
     #[inline(always)]
     pub fn send(&mut self, sender: usize, (start, end): (Time, Time), frame: &Frame, mark: Mark) -> (Wave, Option<u8>) {
         let wave = Wave { sender, end, number: self.sent };
-        if self.flight(wave.id()).listeners > 0 {
+        let mut flight = self.flight_mut(wave.id());
+        if flight.listeners > 0 {
             self.make_room();
+            flight = self.flight_mut(wave.id());
         }
-        let flight = self.flight_mut(wave.id());
         flight.frame.copy_from(frame);
         (flight.start, flight.end, flight.sender) = (start, end, sender);
-        (flight.mark, flight.number) = (mark, wave.number);
+        (flight.mark, flight.number, flight.listeners) = (mark, wave.number, 1);
         let hit = if start < self.clear_from { self.collide(wave.id()) } else { None };
         if !self.jitter.is_empty() {
             self.stray(wave.id());
@@ -252,7 +253,8 @@ impl Bus {
         let overlaps =
             |(from, to): (Time, Time), other: usize| from < to && start < to && from < end && !cuts.part(sender, other);
         // What listeners wait for, however long ago it was sent.
-        for other in flights.iter_mut().filter(|other| other.listeners > 0 && other.is_real()) {
+        for other in flights.iter_mut().filter(|other| other.listeners > 0 && other.number != number && other.is_real())
+        {
             let spoilt = mark.apart && begins_with_idle(other.frame.octets());
             let end = if spoilt { end + t_syn } else { end };
             other.mark.broken |= start < other.end && other.start < end && !cuts.part(sender, other.sender);
@@ -276,7 +278,7 @@ impl Bus {
         }
     }
 
-    /// So many stations will hear the end of this telegram, which was just sent.
+    /// So many stations, not one, will hear the end of this telegram, which was just sent.
     pub fn expect_listeners(&mut self, id: FlightId, count: u16) {
         self.flight_mut(id).listeners = count;
     }

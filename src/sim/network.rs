@@ -19,7 +19,7 @@ mod turn;
 use crate::fdl::params::BusParams;
 use crate::fdl::{Filter, Heard, Input, Order, Outbox, Route, Send, Station, Timer};
 use crate::observation::Observation;
-use crate::sim::bus::{Bus, FlightId, Mark, Wave};
+use crate::sim::bus::{Bus, Flight, FlightId, Mark, Wave};
 use crate::sim::crystal::Crystal;
 use crate::sim::cut::Cuts;
 use crate::sim::fault::Faults;
@@ -184,6 +184,22 @@ struct Slot<S> {
     number: u64,
 }
 
+/// What carrying out a station's answer needs beside the station.
+struct Means<'a, Q> {
+    alarms: &'a mut Alarms,
+    queue: &'a mut Q,
+    now: Time,
+    rate: BitRate,
+}
+
+/// When a station sends the telegram in the outbox: first and last bit.
+#[derive(Clone, Copy, Debug)]
+struct Sending {
+    line: (Time, Time),
+    clock: bool,
+    sender: Address,
+}
+
 impl<S: Station> Slot<S> {
     /// Lets the station answer into the outbox; without supply it does not. Returns `now` if it has.
     #[inline(always)]
@@ -193,6 +209,77 @@ impl<S: Station> Slot<S> {
             self.site.machine.step(now, input, out);
             now
         })
+    }
+    /// A telegram's end reaches the station. Its reading if it has answered.
+    #[inline(always)]
+    fn hear(&mut self, flight: &Flight, now: Time, out: &mut Outbox) -> Option<Local> {
+        // Without octets it was cut off before it began.
+        if !self.powered || flight.frame.is_empty() {
+            return None;
+        }
+        let local = self.site.crystal.to_local(now);
+        let sample = if self.sample_with_telegrams { self.raw(now) } else { 0 };
+        let octets = if flight.mark.broken { &[] } else { flight.frame.octets() };
+        out.clear();
+        self.site.machine.step(local, Input::Telegram(Heard { octets, sample }), out);
+        Some(local)
+    }
+    /// A deadline that was armed for the reading `local` comes. That reading if the station has answered.
+    #[inline(always)]
+    fn due(&mut self, which: usize, local: Local, now: Time, out: &mut Outbox) -> Option<Local> {
+        let input = match Timer::ALL.get(which) {
+            Some(&timer) => Input::Deadline { timer, busy: false },
+            None => Input::Sample(self.raw(now)),
+        };
+        self.ask(local, input, out)
+    }
+    /// Tells what the station of slot `index` has seen at the reading `local`, and arms its deadlines. Returns what it sends.
+    #[inline(always)]
+    fn carry_out<Q: Queue<NetworkEvent>, R: Recorder>(
+        &mut self,
+        (index, local): (usize, Local),
+        out: &Outbox,
+        means: Means<'_, Q>,
+        recorder: &mut R,
+    ) -> Option<Sending> {
+        let Means { alarms, queue, now, rate } = means;
+        for seen in out.observations() {
+            recorder.observe(Stamp { at: now, station: self.address, crystal: &self.site.crystal }, seen);
+        }
+        for (which, order) in out.orders() {
+            match (Alarms::has(which), order) {
+                (true, Order::At(at)) => alarms.arm((index, which), at.max(local), now),
+                (true, Order::Off) => alarms.disarm((index, which)),
+                (false, Order::At(at)) => self.arm((index, which), at.max(local), now, queue),
+                (false, Order::Off) => self.deadlines[which].disarm(),
+            }
+        }
+        debug_assert!(out.has_filter_changed() || self.filter == self.site.machine.filter());
+        let (Send { at, clock }, frame) = out.sending()?;
+        let crystal = &self.site.crystal;
+        let line = (crystal.to_true(at), crystal.to_true(at + rate.octets(frame.len())));
+        Some(Sending { line, clock, sender: self.address })
+    }
+    /// Arms a deadline.
+    #[inline(always)]
+    fn arm<Q>(&mut self, (index, which): (usize, usize), reading: Local, now: Time, queue: &mut Q)
+    where
+        Q: Queue<NetworkEvent>,
+    {
+        let at = self.site.crystal.to_true(reading).max(now);
+        if self.deadlines[which].arm(reading, at) {
+            self.push(index, (at, Phase::Deadline), (Event::Deadline, which as u32), queue);
+        }
+    }
+    /// Something will happen to the station of slot `index`.
+    #[inline(always)]
+    fn push<Q>(&mut self, index: usize, (at, phase): (Time, Phase), (event, number): (Event, u32), queue: &mut Q)
+    where
+        Q: Queue<NetworkEvent>,
+    {
+        let key = Key::new(at, phase, self.address.get(), self.number);
+        self.number += 1;
+        queue.push(event.lane(number as usize), key, NetworkEvent { number, event, slot: index as u8, rank: 0 });
     }
     /// The shaft's raw position at `now` (steps); zero without a shaft.
     #[inline(always)]
@@ -409,20 +496,19 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let NetworkEvent { number, event, slot, mut rank } = happening;
         let mut slot = usize::from(slot);
         loop {
-            let (answered, onward) = match event {
-                Event::Telegram => (self.hear(slot, FlightId::of(number)), None),
+            let mut onward = None;
+            match event {
+                Event::Telegram | Event::Deadline => {}
                 Event::Broadcast => {
                     rank += 1;
-                    let id = FlightId::of(number);
-                    let onward = self.onward(id, rank);
-                    (self.hear(slot, id), onward)
+                    onward = self.onward(FlightId::of(number), rank);
                 }
-                Event::Deadline => (self.turn_deadline(slot, number as usize), None),
-                _ => (self.happen(slot, (event, number as usize), recorder), None),
-            };
-            if let Some(now) = answered {
-                self.carry_out(slot, now, recorder);
+                _ => {
+                    self.happen(slot, (event, number as usize), recorder);
+                    return true;
+                }
             }
+            self.serve(slot, (event, number), recorder);
             let Some((key, listener)) = onward else { return true };
             if self.left == 0 || !self.is_next(key) {
                 self.queue.push(Lane::Soon, key, NetworkEvent { number, event, slot: listener, rank });
@@ -438,12 +524,40 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let time = key.time();
         time < self.alarms.next() && time <= self.limit && self.queue.peek().is_none_or(|head| key < head)
     }
-    /// What comes less often than telegrams and deadlines. The reading at which the station has answered, if that is to be
-    /// carried out.
+    /// A telegram's end reaches a station, or a deadline of it comes.
+    #[inline(always)]
+    fn serve<R: Recorder>(&mut self, index: usize, (event, number): (Event, u32), recorder: &mut R) {
+        let deaf = event != Event::Deadline && !self.faults.is_empty() && self.is_deaf(index);
+        let (now, rate) = (self.now, self.rate);
+        let Self { slots, bus, out, alarms, queue, .. } = self;
+        let slot = &mut slots[index];
+        let answered = if event == Event::Deadline {
+            let which = number as usize;
+            match slot.deadlines[which].turn(now) {
+                Turned::Due(local) => slot.due(which, local, now, out),
+                Turned::Early(at) => {
+                    slot.push(index, (at, Phase::Deadline), (event, number), queue);
+                    None
+                }
+                Turned::Void => None,
+            }
+        } else {
+            let id = FlightId::of(number);
+            let reaches = !deaf && bus.reaches(id, index);
+            let flight = bus.heard(id);
+            if reaches { slot.hear(flight, now, out) } else { None }
+        };
+        if let Some(local) = answered {
+            let means = Means { alarms, queue, now, rate };
+            let sending = slot.carry_out((index, local), out, means, recorder);
+            self.finish(index, sending, recorder);
+        }
+    }
+    /// What comes less often than telegrams and deadlines.
     #[inline(never)]
-    fn happen<R: Recorder>(&mut self, slot: usize, (event, number): (Event, usize), recorder: &mut R) -> Option<Local> {
+    fn happen<R: Recorder>(&mut self, slot: usize, (event, number): (Event, usize), recorder: &mut R) {
         match event {
-            Event::Sent => return self.sent(slot, recorder),
+            Event::Sent => self.sent(slot, recorder),
             Event::Act if self.cancelled.contains(&number) => {}
             Event::Act => self.act(number, recorder),
             Event::Held => self.release(slot, number, recorder),
@@ -452,7 +566,6 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             Event::Source => self.emit(number, recorder),
             Event::Telegram | Event::Broadcast | Event::Deadline => unreachable!("these come often"),
         }
-        None
     }
 
     /// The next event if it is an alarm. A station's other deadlines of the instant come before its alarms.
@@ -530,25 +643,6 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.slots[slot].site.crystal.to_local(self.now)
     }
 
-    /// A telegram's end reaches a station. Its reading if it has answered.
-    #[inline(always)]
-    fn hear(&mut self, index: usize, id: FlightId) -> Option<Local> {
-        let deaf = !self.faults.is_empty() && self.is_deaf(index);
-        let Self { slots, bus, out, now: instant, .. } = self;
-        let slot = &mut slots[index];
-        let hears = slot.powered && !deaf && bus.reaches(id, index);
-        let flight = bus.heard(id);
-        // Without octets it was cut off before it began.
-        if !hears || flight.frame.is_empty() {
-            return None;
-        }
-        let now = slot.site.crystal.to_local(*instant);
-        let sample = if slot.sample_with_telegrams { slot.raw(*instant) } else { 0 };
-        let octets = if flight.mark.broken { &[] } else { flight.frame.octets() };
-        out.clear();
-        slot.site.machine.step(now, Input::Telegram(Heard { octets, sample }), out);
-        Some(now)
-    }
     /// Whether a disturbance keeps a station from hearing.
     #[cold]
     fn is_deaf(&self, slot: usize) -> bool {
@@ -556,9 +650,11 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// A station's cycle begins. Only those of the first station are the network's.
-    fn sent<R: Recorder>(&mut self, slot: usize, recorder: &mut R) -> Option<Local> {
+    fn sent<R: Recorder>(&mut self, slot: usize, recorder: &mut R) {
         // Or it lost its supply before.
-        self.slots[slot].cycle_at.take_if(|at| *at == self.now)?;
+        if self.slots[slot].cycle_at.take_if(|at| *at == self.now).is_none() {
+            return;
+        }
         if self.slots[slot].offset.waits {
             self.tune(slot);
         }
@@ -573,29 +669,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
                 self.act(act, recorder);
             }
         }
-        let now = self.local(slot);
-        self.slots[slot].ask(now, Input::Sent, &mut self.out)
-    }
-
-    /// An event of a deadline comes. The station's reading if it has answered.
-    #[inline(always)]
-    fn turn_deadline(&mut self, index: usize, which: usize) -> Option<Local> {
-        let Self { slots, out, now, .. } = self;
-        let slot = &mut slots[index];
-        match slot.deadlines[which].turn(*now) {
-            Turned::Due(local) => {
-                let input = match Timer::ALL.get(which) {
-                    Some(&timer) => Input::Deadline { timer, busy: false },
-                    None => Input::Sample(slot.raw(*now)),
-                };
-                slot.ask(local, input, out)
-            }
-            Turned::Early(at) => {
-                self.push(at, Phase::Deadline, index, (Event::Deadline, which as u32));
-                None
-            }
-            Turned::Void => None,
-        }
+        self.step(slot, self.local(slot), Input::Sent, recorder);
     }
 
     /// Whether a station sees characters on the line.
@@ -604,34 +678,24 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
 
     /// Lets a station answer, and carries out what it answers.
-    fn step<R: Recorder>(&mut self, slot: usize, now: Local, input: Input<'_, S::Command>, recorder: &mut R) {
-        if let Some(now) = self.slots[slot].ask(now, input, &mut self.out) {
-            self.carry_out(slot, now, recorder);
+    fn step<R: Recorder>(&mut self, index: usize, local: Local, input: Input<'_, S::Command>, recorder: &mut R) {
+        let (now, rate) = (self.now, self.rate);
+        let Self { slots, out, alarms, queue, .. } = self;
+        let slot = &mut slots[index];
+        if let Some(local) = slot.ask(local, input, out) {
+            let means = Means { alarms, queue, now, rate };
+            let sending = slot.carry_out((index, local), out, means, recorder);
+            self.finish(index, sending, recorder);
         }
     }
-
-    /// Does what the station has put into the outbox.
+    /// Does what is left of what the station has put into the outbox.
     #[inline(always)]
-    fn carry_out<R: Recorder>(&mut self, index: usize, now: Local, recorder: &mut R) {
-        let Self { out, slots, alarms, queue, now: instant, .. } = self;
-        let slot = &mut slots[index];
-        for seen in out.observations() {
-            recorder.observe(Stamp { at: *instant, station: slot.address, crystal: &slot.site.crystal }, seen);
-        }
-        for (which, order) in out.orders() {
-            match (Alarms::has(which), order) {
-                (true, Order::At(at)) => alarms.arm((index, which), at.max(now), *instant),
-                (true, Order::Off) => alarms.disarm((index, which)),
-                (false, Order::At(at)) => Self::arm(queue, (index, slot), which, at.max(now), *instant),
-                (false, Order::Off) => slot.deadlines[which].disarm(),
-            }
-        }
-        debug_assert!(out.has_filter_changed() || slot.filter == slot.site.machine.filter());
-        if out.is_unusual() {
+    fn finish<R: Recorder>(&mut self, index: usize, sending: Option<Sending>, recorder: &mut R) {
+        if self.out.is_unusual() {
             self.carry_out_unusual(index);
         }
-        if let Some((send, _)) = self.out.sending() {
-            self.transmit(index, send, recorder);
+        if let Some(sending) = sending {
+            self.transmit(index, sending, recorder);
         }
     }
     /// Does what the station seldom wants.
@@ -658,41 +722,25 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.slots[slot].cycle_at = Some(at);
         self.push(at, Phase::Edge, slot, (Event::Sent, 0));
     }
-    /// Arms a deadline of the station `slot` at `index`.
-    #[inline(always)]
-    fn arm(queue: &mut Q, (index, slot): (usize, &mut Slot<S>), which: usize, reading: Local, now: Time) {
-        let at = slot.site.crystal.to_true(reading).max(now);
-        if slot.deadlines[which].arm(reading, at) {
-            let key = Key::new(at, Phase::Deadline, slot.address.get(), slot.number);
-            slot.number += 1;
-            let (number, event) = (which as u32, Event::Deadline);
-            queue.push(event.lane(which), key, NetworkEvent { number, event, slot: index as u8, rank: 0 });
-        }
-    }
-    fn push(&mut self, at: Time, phase: Phase, index: usize, (event, number): (Event, u32)) {
-        let slot = &mut self.slots[index];
-        let key = Key::new(at, phase, slot.address.get(), slot.number);
-        slot.number += 1;
-        self.queue.push(event.lane(number as usize), key, NetworkEvent { number, event, slot: index as u8, rank: 0 });
+    fn push(&mut self, at: Time, phase: Phase, index: usize, what: (Event, u32)) {
+        self.slots[index].push(index, (at, phase), what, &mut self.queue);
     }
 
     /// Puts the telegram in the outbox onto the line.
     #[inline(always)]
-    fn transmit<R: Recorder>(&mut self, index: usize, send: Send, recorder: &mut R) {
-        let crystal = &self.slots[index].site.crystal;
-        let length = self.rate.octets(self.out.frame().len());
-        let mut line = (crystal.to_true(send.at), crystal.to_true(send.at + length));
-        if send.clock {
+    fn transmit<R: Recorder>(&mut self, index: usize, sending: Sending, recorder: &mut R) {
+        let Sending { mut line, clock, sender } = sending;
+        if clock {
             line = self.send_clock(index, line);
         }
         if !self.faults.is_empty() {
-            match self.disturbed(index, line, send.clock, recorder) {
+            match self.disturbed(index, line, clock, recorder) {
                 Some(left) => line = left,
                 None => return,
             }
         }
-        let (address, frame) = (self.slots[index].address, self.out.frame());
-        let route = announce(frame, address, line, Mark::OWN, recorder);
+        let frame = self.out.frame();
+        let route = announce(frame, sender, line, Mark::OWN, recorder);
         let on_line = self.bus.send(index, line, frame, Mark::OWN);
         self.sent_off(on_line, route, Mark::OWN, recorder);
     }

@@ -47,7 +47,9 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             self.push_telegram(listener, wave, (Event::Telegram, 0), Lane::Soon);
             listeners += 1;
         }
-        self.bus.expect_listeners(wave.id(), listeners);
+        if listeners != 1 {
+            self.bus.expect_listeners(wave.id(), listeners);
+        }
     }
     #[inline(never)]
     fn deliver_to_all(&mut self, wave: Wave, route: Route, apart: bool) {

@@ -79,7 +79,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         self.alarms.retune(index, &slot.site.crystal, self.now);
         for which in 0..Outbox::DEADLINES {
             if let Some(reading) = self.slots[index].deadlines[which].armed() {
-                Self::arm(&mut self.queue, (index, &mut self.slots[index]), which, reading, self.now);
+                self.slots[index].arm((index, which), reading, self.now, &mut self.queue);
             }
         }
     }
