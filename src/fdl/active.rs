@@ -18,7 +18,8 @@
 //! | Claim_Token | a valid telegram | Listen_Token |
 //! | Use_Token | request of the layer above | Await_Data_Response, T_SL armed |
 //! | Use_Token | GAP poll of the layer above | Await_Status_Response, T_SL armed |
-//! | Use_Token | token passed by the layer above | Pass_Token; alone: Use_Token |
+//! | Use_Token | token passed by the layer above | Pass_Token; alone: Use_Token; a slow station: Keep_Token |
+//! | Keep_Token | the station is ready ([`HoldToken`]) | Pass_Token |
 //! | Await_Data_Response, Await_Status_Response | anything but a token or request while the own request has not left | as before |
 //! | Await_Data_Response | answer of the asked station | Use_Token; [`Confirm::Reply`] or [`Confirm::Acknowledged`] |
 //! | Await_Data_Response | anything else, or T_SL over | repeated while retries are left, then Use_Token; [`Confirm::NoReply`] |
@@ -106,6 +107,8 @@ enum State {
     UseToken,
     AwaitDataResponse(Awaited),
     AwaitStatusResponse(Awaited),
+    /// It is passed on when the slow station is ready.
+    KeepToken,
     PassToken(Passing),
     CheckTokenPass(Passing),
 }
@@ -394,7 +397,9 @@ impl Active {
             State::CheckTokenPass(_) => self.idles(now, 0, telegram.copied(), out),
             State::ClaimToken { .. } if telegram.is_some() => self.listens_again(now, out),
             State::Offline | State::ClaimToken { .. } => Confirm::Nothing,
-            State::UseToken | State::PassToken(_) => self.disputed(now, telegram, out).unwrap_or(Confirm::Nothing),
+            State::UseToken | State::KeepToken | State::PassToken(_) => {
+                self.disputed(now, telegram, out).unwrap_or(Confirm::Nothing)
+            }
             State::AwaitDataResponse(awaited) => {
                 let disputed = self.disputed(now, telegram, out).or(self.is_early(now));
                 disputed.unwrap_or_else(|| match telegram {
@@ -466,6 +471,10 @@ impl Active {
             State::Offline | State::UseToken => Confirm::Nothing,
             State::ListenToken { .. } | State::ActiveIdle { .. } => self.silent(now, busy, out),
             State::ClaimToken { tokens_left } => self.claims(now, tokens_left, out),
+            State::KeepToken => {
+                self.pass_to(now, 1, out);
+                Confirm::Nothing
+            }
             State::PassToken(passing) => self.passed(now, passing, out),
             State::CheckTokenPass(passing) => self.not_taken(now, passing, busy, out),
             State::AwaitDataResponse(awaited) => self.unanswered(now, awaited, out),

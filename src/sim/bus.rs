@@ -69,10 +69,6 @@ impl Flight {
     fn is_real(&self) -> bool {
         !self.frame.is_empty()
     }
-    /// Whether it is one of the `recent` telegrams before the one of this number.
-    fn is_just_before(&self, number: u64, recent: u64) -> bool {
-        self.number < number && self.number + recent >= number && self.is_real()
-    }
 }
 
 /// Names a telegram until its last listener has heard it: its number, as far as it tells it from all others on the line.
@@ -111,9 +107,8 @@ impl Wave {
     }
 }
 
-/// Telegrams looked at for telling whether the line is busy somewhere: more are never near each other. A power of two, and
-/// twice as many are kept.
-const RECENT: usize = 8;
+/// Telegrams kept for telling whether the line is busy somewhere: more are never near each other. A power of two.
+const RECENT: usize = 16;
 
 /// The bus.
 #[derive(Clone, Debug)]
@@ -125,8 +120,6 @@ pub struct Bus {
     flights: Vec<Flight>,
     /// Telegrams sent.
     sent: u64,
-    /// How many of them may still be on the line somewhere.
-    recent: u64,
     cuts: Cuts,
     /// From here on nothing is on the line, and a telegram may begin.
     clear_from: Time,
@@ -140,9 +133,8 @@ impl Bus {
         Self {
             delays,
             jitter,
-            flights: (0..RECENT * 2).map(Flight::blank).collect(),
+            flights: (0..RECENT).map(Flight::blank).collect(),
             sent: 0,
-            recent: RECENT as u64,
             cuts: Cuts::none(),
             clear_from: Time::ZERO,
             t_syn: Span::ZERO,
@@ -152,8 +144,8 @@ impl Bus {
     /// short ones of the others: 255 characters last as long as 50 tokens with their pauses.
     #[must_use]
     pub fn with_cuts(self, cuts: Cuts) -> Self {
-        let recent = if cuts.is_empty() { RECENT } else { RECENT * 8 };
-        Self { flights: (0..recent * 2).map(Flight::blank).collect(), recent: recent as u64, cuts, ..self }
+        let kept = if cuts.is_empty() { RECENT } else { RECENT * 4 };
+        Self { flights: (0..kept).map(Flight::blank).collect(), cuts, ..self }
     }
     /// The disturbance called `name` cuts the cable at this place from now on, or it is whole again.
     pub fn cut(&mut self, (name, place): (&str, Place), open: bool, now: Time) {
@@ -163,7 +155,7 @@ impl Bus {
             return;
         }
         // What is on the line in both parts meets.
-        let Self { flights, sent, recent, cuts, .. } = self;
+        let Self { flights, cuts, .. } = self;
         for place in 0..flights.len() {
             let flight = &flights[place];
             let meets = |other: &Flight| {
@@ -172,7 +164,7 @@ impl Bus {
                 cuts.part_by(before, a, b) && !cuts.part(a, b) && both.0 < both.1
             };
             let waits = flight.listeners > 0 && flight.is_real();
-            if waits && flights.iter().any(|other| other.is_just_before(*sent, *recent) && meets(other)) {
+            if waits && flights.iter().any(|other| other.is_real() && meets(other)) {
                 flights[place].mark.broken = true;
             }
         }
@@ -248,8 +240,8 @@ impl Bus {
     fn collide(&mut self, id: FlightId) -> Option<u8> {
         let &Flight { start, end, sender, number, mark, ref frame, .. } = self.flight(id);
         let needs_idle = begins_with_idle(frame.octets());
-        let Self { flights, recent, cuts, t_syn, .. } = self;
-        let (t_syn, recent) = (*t_syn, *recent);
+        let Self { flights, cuts, t_syn, .. } = self;
+        let t_syn = *t_syn;
         let overlaps =
             |(from, to): (Time, Time), other: usize| from < to && start < to && from < end && !cuts.part(sender, other);
         // What listeners wait for, however long ago it was sent.
@@ -259,7 +251,7 @@ impl Bus {
             let end = if spoilt { end + t_syn } else { end };
             other.mark.broken |= start < other.end && other.start < end && !cuts.part(sender, other.sender);
         }
-        let others = || flights.iter().filter(|other| other.is_just_before(number, recent));
+        let others = || flights.iter().filter(|other| other.number != number && other.is_real());
         let hit = others().filter(|sent| overlaps((sent.start, sent.end), sent.sender));
         let hit = hit.max_by_key(|sent| (sent.end, sent.number)).map(|sent| sent.sender);
         let spoils = |sent: &Flight| {
@@ -321,8 +313,7 @@ impl Bus {
     }
     /// Whether the station `listener` sees characters at `now`.
     pub fn is_busy(&self, now: Time, listener: usize) -> bool {
-        let recent = self.flights.iter().filter(|sent| sent.is_just_before(self.sent, self.recent));
-        recent.filter(|sent| !self.cuts.part(sent.sender, listener)).any(|sent| {
+        self.flights.iter().filter(|sent| sent.is_real() && !self.cuts.part(sent.sender, listener)).any(|sent| {
             let delay = self.delays.of(sent.sender, listener, &sent.strays);
             sent.start + delay <= now && now < sent.end + delay
         })
@@ -439,15 +430,30 @@ mod tests {
     }
 
     #[test]
+    fn a_long_telegram_meets_each_of_many_short_ones_and_is_kept_until_it_is_heard() {
+        let mut bus = line();
+        let (long, _) = bus.send(0, (ns(0), ns(100_000)), &token(), Mark::OWN);
+        for n in 0..3 * RECENT as i64 {
+            let (short, hit) = bus.send(1, (ns(1_000 * n), ns(1_000 * n + 500)), &token(), Mark::OWN);
+            assert_eq!((hit, bus.flight(short.id()).mark.broken), (Some(0), true), "short telegram {n}");
+            bus.heard(short.id());
+            assert_eq!(bus.wave(long.id()), long);
+        }
+        assert!(bus.heard(long.id()).mark.broken);
+    }
+
+    #[test]
     fn a_receiver_sees_the_line_busy_one_delay_later() {
         let mut bus = line();
         let (wave, _) = bus.send(0, (ns(100), ns(200)), &token(), Mark::OWN);
         assert_eq!((wave.number, bus.wave(wave.id())), (0, wave));
         assert_eq!([149, 150, 249, 250].map(|t| bus.is_busy(ns(t), 1)), [false, true, true, false]);
         assert_eq!((bus.arrival(wave, 0), bus.arrival(wave, 1)), (ns(200), ns(250)));
-        // Forgotten when as many as are kept have followed.
+        // Forgotten when everybody has heard it and as many as are kept have followed.
+        bus.heard(wave.id());
         for _ in 0..RECENT {
-            bus.send(1, (ns(1_000), ns(1_100)), &token(), Mark::OWN);
+            let (other, _) = bus.send(1, (ns(1_000), ns(1_100)), &token(), Mark::OWN);
+            bus.expect_listeners(other.id(), 0);
         }
         assert!(!bus.is_busy(ns(150), 1) && bus.is_busy(ns(1_050), 1) && bus.is_busy(ns(1_149), 0));
     }

@@ -527,6 +527,14 @@ mod tests {
     }
 
     #[test]
+    fn a_row_without_room_goes_on() {
+        // Every third comes out of turn; in the second half one is taken for each that is pushed.
+        let ahead = |n: i64| if n % 3 == 0 { 5_000 + n - n % 100 } else { 10_000 + n };
+        let script = (0..1_200).map(|n| (ahead(n), 3, (n as u8 % 3, Lane::Row(1)), n > 600));
+        follows::<NearQueue<u64>>(&script.collect::<Vec<_>>());
+    }
+
+    #[test]
     fn both_queues_agree_on_a_long_bus_cycle() {
         // Far deadlines for every station, some out of turn, then chains of near events: the shape of a real run.
         let mut script = Vec::new();

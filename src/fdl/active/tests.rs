@@ -34,10 +34,11 @@ const CLAIM: &str = "Claim_Token";
 const USE: &str = "Use_Token";
 const DATA: &str = "Await_Data_Response";
 const STATUS: &str = "Await_Status_Response";
+const KEEP: &str = "Keep_Token";
 const PASS: &str = "Pass_Token";
 const CHECK: &str = "Check_Token_Pass";
 const OFFLINE: &str = "Offline";
-const STATES: [&str; 11] = [OFFLINE, NOT_READY, READY, IDLE, SKIPPED, CLAIM, USE, DATA, STATUS, PASS, CHECK];
+const STATES: [&str; 12] = [OFFLINE, NOT_READY, READY, IDLE, SKIPPED, CLAIM, USE, DATA, STATUS, KEEP, PASS, CHECK];
 
 fn name(active: &Active) -> &'static str {
     match active.state {
@@ -50,6 +51,7 @@ fn name(active: &Active) -> &'static str {
         State::UseToken => USE,
         State::AwaitDataResponse(_) => DATA,
         State::AwaitStatusResponse(_) => STATUS,
+        State::KeepToken => KEEP,
         State::PassToken(_) => PASS,
         State::CheckTokenPass(_) => CHECK,
     }
@@ -73,6 +75,7 @@ fn station_in(state: &str) -> Active {
         USE => State::UseToken,
         DATA => State::AwaitDataResponse(awaited),
         STATUS => State::AwaitStatusResponse(awaited),
+        KEEP => State::KeepToken,
         PASS => State::PassToken(passing),
         CHECK => State::CheckTokenPass(passing),
         _ => unreachable!(),
@@ -105,16 +108,16 @@ fn inputs() -> [(&'static str, Option<Frame>); 12] {
 /// Where the state changes; everywhere else it stays.
 const CHANGES: &[(&str, &[&str], &str)] = &[
     ("own address", &[NOT_READY, READY], OFFLINE),
-    ("own address", &[IDLE, SKIPPED, CLAIM, USE, DATA, STATUS, PASS, CHECK], NOT_READY),
+    ("own address", &[IDLE, SKIPPED, CLAIM, USE, DATA, STATUS, KEEP, PASS, CHECK], NOT_READY),
     ("token from PS", &[READY, IDLE, SKIPPED, CHECK], USE),
     ("token from another", &[CHECK], IDLE),
     ("token past", &[IDLE], SKIPPED),
     ("token past", &[CHECK], SKIPPED),
     ("token past", &[SKIPPED], NOT_READY),
-    ("token past", &[USE, DATA, STATUS, PASS], IDLE),
-    ("token elsewhere", &[USE, DATA, STATUS, PASS, CHECK], IDLE),
-    ("request", &[USE, DATA, STATUS, PASS, CHECK], IDLE),
-    ("status request", &[USE, DATA, STATUS, PASS, CHECK], IDLE),
+    ("token past", &[USE, DATA, STATUS, KEEP, PASS], IDLE),
+    ("token elsewhere", &[USE, DATA, STATUS, KEEP, PASS, CHECK], IDLE),
+    ("request", &[USE, DATA, STATUS, KEEP, PASS, CHECK], IDLE),
+    ("status request", &[USE, DATA, STATUS, KEEP, PASS, CHECK], IDLE),
     ("answer", &[DATA, STATUS], USE),
     ("answer", &[CHECK], IDLE),
     ("foreign answer", &[DATA, STATUS], USE),
@@ -131,6 +134,8 @@ const CHANGES: &[(&str, &[&str], &str)] = &[
     ("foreign answer", &[CLAIM], NOT_READY),
     ("timer, busy", &[CLAIM], USE),
     ("timer, silent", &[CLAIM], USE),
+    ("timer, busy", &[KEEP], PASS),
+    ("timer, silent", &[KEEP], PASS),
     ("timer, busy", &[PASS], CHECK),
     ("timer, silent", &[PASS], CHECK),
     ("timer, busy", &[CHECK], IDLE),
@@ -152,7 +157,7 @@ fn every_state_takes_every_input_as_the_table_says() {
             };
             let change = CHANGES.iter().find(|(on, from, _)| *on == input && from.contains(&state));
             assert_eq!(name(&active), change.map_or(state, |(_, _, to)| to), "{state} + {input}");
-            let had = [USE, DATA, STATUS, PASS].contains(&state);
+            let had = [USE, DATA, STATUS, KEEP, PASS].contains(&state);
             let gone = had && [IDLE, NOT_READY].contains(&name(&active));
             assert_eq!(confirm == Confirm::TokenGone, gone, "{state} + {input}: {confirm:?}");
             let held = !had && name(&active) == USE;
@@ -539,23 +544,48 @@ fn a_second_holder_gives_the_token_up() {
 fn a_token_that_is_held_leaves_later_and_its_sender_waits_for_it_from_there() {
     let hold = Span::from_us(300);
     let mut active = station_in(USE);
-    let leave = |active: &mut Active| {
-        let (mut out, begin) = (Outbox::new(), Local::from_ticks(1_000_000));
-        let end = active.pass_token(begin, &mut out);
+    let begin = Local::from_ticks(1_000_000);
+    let leaves = |active: &Active, out: &Outbox, at: Local, end: Local| {
         let (send, frame) = out.sending().expect("the token");
-        assert_eq!(frame.octets(), [0xDC, 9, 5]);
+        assert_eq!((send.at, frame.octets(), name(active)), (at, &[0xDC, 9, 5][..], PASS));
+        assert_eq!(end - at, BitRate::M12.octets(3));
         // T_SL counts from the last bit.
         let orders: Vec<_> = out.orders().collect();
         assert_eq!(orders, [(Timer::Slot as usize, Order::At(end))]);
-        (send.at - begin, end - send.at, name(active))
     };
-    let octets = BitRate::M12.octets(3);
     active.hold_token(HoldToken(hold));
-    assert_eq!(leave(&mut active), (hold, octets, PASS));
+    let mut out = Outbox::new();
+    let end = active.pass_token(begin, &mut out);
+    assert!(out.sending().is_none() && !active.may_send());
+    assert_eq!(out.orders().collect::<Vec<_>>(), [(Timer::Slot as usize, Order::At(begin + hold))]);
+    out.clear();
+    assert_eq!(active.slot_over(begin + hold, false, &mut out), Confirm::Nothing);
+    leaves(&active, &out, begin + hold, end);
+
     let mut active = station_in(USE);
     active.hold_token(HoldToken(hold));
     active.hold_token(HoldToken(Span::ZERO));
-    assert_eq!(leave(&mut active), (Span::ZERO, octets, PASS));
+    out.clear();
+    let end = active.pass_token(begin, &mut out);
+    leaves(&active, &out, begin, end);
+}
+
+#[test]
+fn a_token_that_is_held_does_not_leave_any_more_when_another_station_has_one() {
+    let hold = Span::from_ms(5);
+    let mut active = station_in(USE);
+    active.hold_token(HoldToken(hold));
+    let (mut out, begin) = (Outbox::new(), Local::from_ticks(1_000_000));
+    active.pass_token(begin, &mut out);
+    out.clear();
+    let mut frame = Frame::new();
+    frame.set_token(Address::new(9).unwrap(), Address::new(3).unwrap());
+    let telegram = Telegram::parse(frame.octets()).expect("a token");
+    let confirm = active.heard_other(begin + Span::from_ms(1), Some(&telegram), &mut out);
+    assert_eq!((confirm, name(&active)), (Confirm::TokenGone, IDLE));
+    assert!(out.sending().is_none());
+    let slot = out.orders().find(|&(which, _)| which == Timer::Slot as usize);
+    assert!(matches!(slot, Some((_, Order::At(at))) if at < begin + hold), "T_TO instead: {slot:?}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::{Active, Confirm, Passing, State};
 use crate::fdl::{Outbox, Timer};
 use crate::observation::{Observation, RingExit};
-use crate::time::Local;
+use crate::time::{Local, Span};
 use crate::wire::{Address, FrameControl, Header, Service, StationType, Status, Telegram};
 
 /// How often the token is sent to one station that is not heard (profirust).
@@ -24,10 +24,17 @@ impl Active {
     /// While an answer is awaited: a bug of the caller.
     pub fn pass_token(&mut self, at: Local, out: &mut Outbox) -> Local {
         assert!(self.may_send(), "the token is passed when nothing is awaited");
-        // The station itself is slow and knows when its token leaves: were it late on the line alone, it would be repeated.
-        self.pass_to(at + self.hold, 1, out)
+        if self.hold == Span::ZERO || self.ring.is_alone() {
+            return self.pass_to(at + self.hold, 1, out);
+        }
+        // The station itself is slow: were the token late on the line alone, it would be repeated. It is not sent yet, since
+        // what the others do until then may be the end of it.
+        let at = at + self.hold;
+        out.arm(Timer::Slot, at);
+        self.state = State::KeepToken;
+        at + self.bus.rate.octets(TOKEN_OCTETS)
     }
-    fn pass_to(&mut self, at: Local, attempt: u8, out: &mut Outbox) -> Local {
+    pub(super) fn pass_to(&mut self, at: Local, attempt: u8, out: &mut Outbox) -> Local {
         let to = self.ring.ns();
         let end = self.send_token(at, to, out);
         if to == self.address {
