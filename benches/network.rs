@@ -79,7 +79,7 @@ fn counted(cycles: u64, mut run: impl FnMut(u64)) {
 /// One contender in operation, then so many cycles of it, once.
 ///
 /// # Panics
-/// If the contender is none of `network`, `bare` and `loop`.
+/// If the contender is none of `network`, `bare`, `prints` and `loop`.
 fn count(contender: &str, encoders: &str, cycles: u64) {
     let scenario = encoders.parse().map_or_else(
         |_| Scenario::load(encoders.as_ref(), &[]).unwrap_or_else(|error| panic!("{error}")),
@@ -96,12 +96,16 @@ fn count(contender: &str, encoders: &str, cycles: u64) {
             let mut bare = Watched::new(&scenario, ());
             counted(cycles, |cycles| bare.run(cycles));
         }
+        "prints" => {
+            let mut prints = Watched::new(&scenario, Fingerprints::new(scenario.master.address));
+            counted(cycles, |cycles| prints.run(cycles));
+        }
         "loop" => {
             let (network, start) = encoders::started(&scenario);
             let mut straight = check::caught_up::<true>(&scenario, &network, &start);
             counted(cycles, |cycles| straight.run(cycles, &mut ()));
         }
-        _ => panic!("{contender} is none of network, bare and loop"),
+        _ => panic!("{contender} is none of network, bare, prints and loop"),
     }
 }
 
