@@ -695,8 +695,8 @@ fn a_stop_rule_goes_on_until_the_mean_is_known_and_not_further_whatever_stops_it
 }
 
 /// What a part of the shipped scenarios comes to under this version of the model.
-const KNOWN: (u32, [(&str, &str); 3]) = (
-    1,
+const KNOWN: (u32, [(&str, &str); 4]) = (
+    2,
     [
         (
             "reference",
@@ -705,6 +705,10 @@ const KNOWN: (u32, [(&str, &str); 3]) = (
         (
             "slave-to-slave",
             "fingerprint: wire c45eb035672ac1c0  states 5ec204d7090ebe20  latches d0c71df4dd85e94d  statistics d5e4cb2c6ce9bc4c",
+        ),
+        (
+            "burst-noise",
+            "fingerprint: wire 375a62fedba3a5af  states 90701b8d5efb2edc  latches a8c708195974e55a  statistics 4e7874e2cff0e4c7",
         ),
         (
             "lost-token",

@@ -14,7 +14,7 @@ pub use crate::study::statistics::aggregate::{RunKey, RunKeyError};
 use crate::study::verdict::Expectation;
 
 /// Version of the model's behaviour. A change that changes a fingerprint raises it: finished runs are then run again.
-pub const MODEL_VERSION: u32 = 1;
+pub const MODEL_VERSION: u32 = 2;
 
 /// A combination of parameters without its seed: what all its repetitions have in common.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
