@@ -527,6 +527,13 @@ mod tests {
     }
 
     #[test]
+    fn what_comes_before_the_first_of_a_row_or_of_the_heap_does_not_stand_for_it() {
+        for &lane in LANES {
+            follows::<NearQueue<u64>>(&[10, 5, 7, 20, 6].map(|ahead| (ahead, 3, (1, lane), false)));
+        }
+    }
+
+    #[test]
     fn a_row_without_room_goes_on() {
         // Every third comes out of turn; in the second half one is taken for each that is pushed.
         let ahead = |n: i64| if n % 3 == 0 { 5_000 + n - n % 100 } else { 10_000 + n };
