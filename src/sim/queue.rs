@@ -112,7 +112,7 @@ pub trait Queue<E: Copy>: Default {
 
 /// Room for one event of each station of a full network, and some: in a row, and in what grows before it does.
 const ROOM: usize = 1 << u8::BITS;
-/// Steps from the end of a list before a search halves.
+/// Steps from the end of a list, beyond which a search halves.
 const STEPS: usize = 8;
 
 /// When an event will come, as far as its kind tells: a hint that says where it waits best. It never changes the order, only
@@ -406,15 +406,14 @@ impl<E: Copy> Row<E> {
             return Squeezed::Out;
         }
         let (begin, mut place) = (usize::from(self.begin), usize::from(self.end));
-        let nearest = begin.max(place.saturating_sub(STEPS));
-        while place > nearest && self.list[place - 1].key > key {
-            self.list[place] = self.list[place - 1];
-            place -= 1;
-        }
-        if place == nearest && place > begin {
-            let before = begin + self.list[begin..place].partition_point(|waiting| waiting.key < key);
+        if place - begin > STEPS && self.list[place - STEPS].key > key {
+            let before = begin + self.list[begin..place - STEPS].partition_point(|waiting| waiting.key < key);
             self.list.copy_within(before..place, before + 1);
             place = before;
+        }
+        while place > begin && self.list[place - 1].key > key {
+            self.list[place] = self.list[place - 1];
+            place -= 1;
         }
         self.list[place] = next;
         self.end += 1;

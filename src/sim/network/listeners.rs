@@ -38,13 +38,13 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         for rank in 0..self.attentive.len() {
             let listener = usize::from(self.attentive[rank]);
             if listener != wave.sender || apart {
-                self.push_telegram(listener, wave, (Event::Telegram, 0), Lane::Soon);
+                self.push_telegram(listener, wave, Lane::Soon);
                 listeners += 1;
             }
         }
         let addressed = route.and_then(|route| self.addressed[usize::from(route.da)]).map(usize::from);
         if let Some(listener) = addressed.filter(|&slot| slot != wave.sender || apart) {
-            self.push_telegram(listener, wave, (Event::Telegram, 0), Lane::Soon);
+            self.push_telegram(listener, wave, Lane::Soon);
             listeners += 1;
         }
         if listeners != 1 {
@@ -61,7 +61,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
             let listener = self.attentive.iter().chain(&self.subscribers).nth(rank);
             let Some(listener) = listener.map(|&slot| usize::from(slot)) else { break };
             if (listener != wave.sender || apart) && self.slots[listener].filter.passes(Some(route)) {
-                self.push_telegram(listener, wave, (Event::Telegram, 0), Lane::Soon);
+                self.push_telegram(listener, wave, Lane::Soon);
                 listeners += 1;
             }
         }
@@ -74,7 +74,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         let count = self.neighbours[wave.sender].len();
         self.bus.expect_listeners(wave.id(), count as u16 + u16::from(apart));
         if apart {
-            self.push_telegram(wave.sender, wave, (Event::Telegram, 0), Lane::Soon);
+            self.push_telegram(wave.sender, wave, Lane::Soon);
         }
         if self.bus.delays().is_steady() && !self.faults.strays_arrivals() {
             if let Some((key, slot)) = self.onward(wave.id(), 0) {
@@ -85,7 +85,7 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
         }
         for rank in 0..count {
             let listener = self.neighbours[wave.sender][rank].slot.into();
-            self.push_telegram(listener, wave, (Event::Telegram, 0), Event::ARRIVALS);
+            self.push_telegram(listener, wave, Event::ARRIVALS);
         }
     }
     /// The neighbour of this rank, if there is one, and the key of the event that a telegram for all reaches it.
@@ -101,13 +101,14 @@ impl<S: Station, Q: Queue<NetworkEvent>> Network<S, Q> {
     }
     /// The telegram's end reaches `listener`. Of telegrams that end there at one instant the one sent first comes first.
     #[inline(always)]
-    fn push_telegram(&mut self, listener: usize, wave: Wave, (event, rank): (Event, u8), lane: Lane) {
+    fn push_telegram(&mut self, listener: usize, wave: Wave, lane: Lane) {
         let mut at = self.bus.arrival(wave, listener);
         if self.faults.strays_arrivals() {
             at = self.captured(at, wave.id(), listener);
         }
         let key = Key::new(at, Phase::Telegram, self.slots[listener].address.get(), wave.number);
-        self.queue.push(lane, key, NetworkEvent { number: wave.id().number(), event, slot: listener as u8, rank });
+        let (number, event) = (wave.id().number(), Event::Telegram);
+        self.queue.push(lane, key, NetworkEvent { number, event, slot: listener as u8, rank: 0 });
     }
     /// When a receiver that strays captures the end of a telegram that reaches it `at`.
     #[cold]
